@@ -1,0 +1,1 @@
+"""Modelling, inverting and simulating structurally elastic robots."""

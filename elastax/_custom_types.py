@@ -1,0 +1,43 @@
+"""Array aliases with named axes, and the converter of real parameters."""
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+
+Scalar = Float[Array, ""]
+PerJoint = Float[Array, " joints"]
+PerElastic = Float[Array, " elastic"]
+Vector3 = Float[Array, "3"]
+Matrix3 = Float[Array, "3 3"]
+Transform = Float[Array, "4 4"]
+Times = Float[Array, " times"]
+
+
+def as_real(value):
+    """`value` as a floating-point array; integers take the default float type."""
+    array = jnp.asarray(value)
+    if jnp.issubdtype(array.dtype, jnp.floating):
+        return array
+    return array.astype(jax.dtypes.canonicalize_dtype(jnp.float64))
+
+
+def as_optional_real(value):
+    """Like `as_real`, but `None` stays `None`."""
+    return None if value is None else as_real(value)
+
+
+def require_float64(what: str) -> None:
+    """Raise unless double precision is switched on.
+
+    Args:
+        what: the computation that needs it, for the message.
+
+    Raises:
+        ValueError: JAX runs in single precision.
+    """
+    if jnp.zeros(()).dtype != jnp.float64:
+        raise ValueError(
+            f"{what} needs double precision: call "
+            '`jax.config.update("jax_enable_x64", True)` before any other JAX call'
+        )

@@ -1,0 +1,54 @@
+"""Elastic robots: assembly, energies, equations of motion, simulation."""
+
+from ._block_form import (
+    EquationsOfMotion as EquationsOfMotion,
+    equations_of_motion as equations_of_motion,
+    forward_dynamics as forward_dynamics,
+)
+from ._bodies import RigidBodies as RigidBodies, no_bodies as no_bodies
+from ._command import (
+    CommandInterpolant as CommandInterpolant,
+    MotorCommand as MotorCommand,
+    MotorSample as MotorSample,
+    MotorSetpoint as MotorSetpoint,
+)
+from ._dh import dh_link as dh_link
+from ._energy import (
+    dissipated_power as dissipated_power,
+    kinetic_energy as kinetic_energy,
+    potential_energy as potential_energy,
+)
+from ._equilibrium import (
+    holding_torque as holding_torque,
+    static_equilibrium as static_equilibrium,
+)
+from ._lagrange import lagrange_forces as lagrange_forces
+from ._newton_euler import (
+    generalised_forces as generalised_forces,
+    inverse_dynamics as inverse_dynamics,
+    multibody as multibody,
+)
+from ._parts import (
+    Axis as Axis,
+    Body as Body,
+    ElasticJoint as ElasticJoint,
+    EndSlope as EndSlope,
+    Offset as Offset,
+    Part as Part,
+    WristCentre as WristCentre,
+    assemble as assemble,
+)
+from ._robot import (
+    AxisRole as AxisRole,
+    ElasticRobot as ElasticRobot,
+    ElasticRole as ElasticRole,
+    JointLimits as JointLimits,
+    SlopeRole as SlopeRole,
+)
+from ._simulate import (
+    AbstractMotorController as AbstractMotorController,
+    SimulationResult as SimulationResult,
+    resting_state as resting_state,
+    simulate as simulate,
+    tool_state as tool_state,
+)

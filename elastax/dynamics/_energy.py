@@ -1,0 +1,101 @@
+"""Energies of the elastic robot: the definition that everything else must agree with."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._custom_types import PerElastic, PerJoint, Scalar
+from ..kinematics import moving_frames
+from ._robot import ElasticRobot
+
+
+def body_poses(
+    robot: ElasticRobot, q: PerJoint, eta: PerElastic
+) -> tuple[Float[Array, "bodies 3 3"], Float[Array, "bodies 3"]]:
+    """Orientations and centres of mass [m] of all bodies in the base frame."""
+    frames = moving_frames(robot.chain, robot.joint_coordinates(q, eta))
+    bodies = robot.all_bodies()
+    index = np.array(bodies.joint, int)
+    rotation = frames.rotation[index]
+    com = frames.position[index] + jnp.einsum("kab,kb->ka", rotation, bodies.com)
+    return rotation, com
+
+
+def kinetic_energy(
+    robot: ElasticRobot,
+    q: PerJoint,
+    eta: PerElastic,
+    qd: PerJoint,
+    etad: PerElastic,
+    thetad: PerJoint,
+) -> Scalar:
+    r"""Kinetic energy [J] of bodies and rotors.
+
+    $T = \tfrac12\sum_i (m_i \dot r_i^T \dot r_i + \omega_i^T \Theta_i \omega_i) +
+    \tfrac12 \dot\theta^T \Theta \dot\theta$ with velocities by differentiation of the
+    positions and $\tilde\omega = R^T \dot R$. A robot with rigid gears takes
+    `thetad` = `qd`.
+
+    References:
+        [Reiner2010] (2.28), (2.33); the rotors turn about their own axes only.
+    """
+    (rotation, _), (turning, velocity) = jax.jvp(
+        lambda a, b: body_poses(robot, a, b), (q, eta), (qd, etad)
+    )
+    bodies = robot.all_bodies()
+    cross_matrix = jnp.einsum("kba,kbc->kac", rotation, turning)
+    omega = 0.5 * jnp.stack(
+        [
+            cross_matrix[:, 2, 1] - cross_matrix[:, 1, 2],
+            cross_matrix[:, 0, 2] - cross_matrix[:, 2, 0],
+            cross_matrix[:, 1, 0] - cross_matrix[:, 0, 1],
+        ],
+        axis=1,
+    )
+    if not robot.has_elastic_gears:
+        thetad = qd
+    return 0.5 * (
+        jnp.sum(bodies.mass * jnp.sum(velocity**2, axis=1))
+        + jnp.einsum("ka,kab,kb->", omega, bodies.inertia, omega)
+        + jnp.sum(robot.drives.reflected_inertia() * thetad**2)
+    )
+
+
+def potential_energy(
+    robot: ElasticRobot, q: PerJoint, eta: PerElastic, theta: PerJoint
+) -> Scalar:
+    r"""Potential energy [J] of gravity, gears, structure and counterbalance.
+
+    References:
+        [Reiner2010] (2.34) with $V = -m g^T r$ for a gravity vector that points down,
+        (2.35), (3.80b).
+    """
+    _, com = body_poses(robot, q, eta)
+    energy = -jnp.sum(robot.all_bodies().mass * (com @ robot.gravity))
+    if robot.drives.stiffness is not None:
+        energy = energy + jnp.sum(robot.drives.stiffness.potential(q - theta))
+    if robot.structure_stiffness is not None:
+        energy = energy + jnp.sum(robot.structure_stiffness.potential(eta))
+    if robot.counterbalance is not None:
+        energy = energy + robot.counterbalance.potential(q[robot.counterbalanced_axis])
+    return energy
+
+
+def dissipated_power(
+    robot: ElasticRobot,
+    qd: PerJoint,
+    etad: PerElastic,
+    thetad: PerJoint,
+) -> Scalar:
+    """Power [W] lost in friction, gear dampers and structural dampers."""
+    drives = robot.drives
+    if not robot.has_elastic_gears:
+        thetad = qd
+    slip = qd - thetad
+    return (
+        jnp.sum(drives.motor_friction.torque(thetad) * thetad)
+        + jnp.sum(drives.joint_friction.torque(qd) * qd)
+        + jnp.sum(drives.damping * slip**2)
+        + jnp.sum(robot.structure_damping * etad**2)
+    )

@@ -1,0 +1,55 @@
+"""Static equilibria of the elastic robot."""
+
+import jax
+import jax.numpy as jnp
+
+from .._custom_types import PerElastic, PerJoint
+from ._newton_euler import inverse_dynamics
+from ._robot import ElasticRobot
+
+
+_STEPS = 12  # Newton steps; the springs are nearly linear, four reach rounding
+
+
+def static_equilibrium(
+    robot: ElasticRobot, theta: PerJoint
+) -> tuple[PerJoint, PerElastic]:
+    """Joint angles and deformations at which the robot rests on locked motors.
+
+    Newton's method from the undeformed robot, with a fixed number of steps.
+
+    Args:
+        robot: the robot, with elastic gears.
+        theta: motor angles on the output side [rad], shape (axes,).
+
+    Returns:
+        q (axes,) and eta (elastic,) [rad].
+    """
+    n = robot.axes
+    zero = jnp.zeros_like(theta)
+    rest = jnp.zeros((robot.elastic,), theta.dtype)
+
+    def residual(x):
+        q, eta = x[:n], x[n:]
+        joint, structure = inverse_dynamics(robot, q, zero, zero, eta, rest, rest)
+        if robot.has_elastic_gears:
+            joint = joint + robot.drives.gear_torque(q - theta, zero)
+        else:
+            joint = q - theta
+        return jnp.concatenate([joint, structure])
+
+    def newton(x, _):
+        slope = jax.jacfwd(residual)(x)
+        return x - jnp.linalg.solve(slope, residual(x)), None
+
+    start = jnp.concatenate([theta, rest])
+    x, _ = jax.lax.scan(newton, start, None, length=_STEPS)
+    return x[:n], x[n:]
+
+
+def holding_torque(
+    robot: ElasticRobot, q: PerJoint, eta: PerElastic | None = None
+) -> PerJoint:
+    """Torques [N m] behind the gears that hold the robot at rest, shape (axes,)."""
+    zero = jnp.zeros_like(q)
+    return inverse_dynamics(robot, q, zero, zero, eta)[0]

@@ -1,0 +1,251 @@
+"""Parts of a robot, listed from base to flange, and their assembly."""
+
+import dataclasses
+
+import numpy as np
+
+from .._custom_types import as_real
+from ..drivetrain import AbstractCounterbalance, DriveTrain
+from ..kinematics import JointKind, SerialChain
+from ..structure import CubicStiffness, LinearStiffness
+from ._bodies import RigidBodies, no_bodies
+from ._inertia import check_inertia
+from ._robot import (
+    AxisRole,
+    ElasticRobot,
+    ElasticRole,
+    JointLimits,
+    JointRole,
+    SlopeRole,
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Offset:
+    """Constant transform to the following part.
+
+    Attributes:
+        position: [m], shape (3,).
+        rotation: shape (3, 3); identity unless given.
+    """
+
+    position: object = (0.0, 0.0, 0.0)
+    rotation: object = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Axis:
+    """Driven axis along z of the current frame, with its drive train elsewhere."""
+
+    name: str
+    kind: JointKind = JointKind.REVOLUTE
+
+
+@dataclasses.dataclass(frozen=True)
+class ElasticJoint:
+    """Hinge with spring and damper: a tilt joint or the hinge of a beam.
+
+    Attributes:
+        name: of the elastic coordinate.
+        axis: unit vector in the current frame.
+        stiffness: spring constant [N m/rad].
+        damping: damper constant [N m s/rad].
+        hardening: gamma of (2.7) [1/rad^2].
+
+    References:
+        [Reiner2010] sections 2.4.1 and 2.4.3.
+    """
+
+    name: str
+    axis: tuple[float, float, float]
+    stiffness: object
+    damping: object
+    hardening: object = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class EndSlope:
+    """Joint at the end of a beam that follows one of its hinges, about the same axis.
+
+    Attributes:
+        of: name of the elastic coordinate.
+        factor: angle of this joint over the angle of the hinge (1/2 under a tip force).
+
+    References:
+        [Reiner2010] section 2.4.3, second variant.
+    """
+
+    of: str
+    factor: object
+
+
+@dataclasses.dataclass(frozen=True)
+class Body:
+    """Rigid body in the current frame.
+
+    Attributes:
+        name: for messages.
+        mass: [kg].
+        com: centre of mass [m].
+        inertia: about the centre of mass, shape (3, 3) [kg m^2].
+    """
+
+    name: str
+    mass: object
+    com: object
+    inertia: object
+
+
+@dataclasses.dataclass(frozen=True)
+class WristCentre:
+    """Marks the next axis as the one whose origin is the wrist centre."""
+
+
+Part = Offset | Axis | ElasticJoint | EndSlope | Body | WristCentre
+
+
+def assemble(
+    name: str,
+    parts: list[Part],
+    drives: DriveTrain,
+    limits: JointLimits,
+    *,
+    axis_signs,
+    axis_zeros,
+    poses,
+    counterbalance: AbstractCounterbalance | None = None,
+    counterbalanced_axis: int = 1,
+    gravity=(0.0, 0.0, -9.81),
+    tool=None,
+    sources: tuple[str, ...] = (),
+    assumptions: tuple[str, ...] = (),
+) -> ElasticRobot:
+    """Elastic robot from its parts, listed from the base to the flange.
+
+    Frames are carried along: each part stands in the frame that the parts in front of it
+    have led to. Bodies belong to the joint in front of them. The parts hold numbers; to
+    differentiate by a parameter, replace the leaf of the assembled robot.
+
+    Args:
+        name: of the robot.
+        parts: the parts in their order.
+        drives: one drive train per axis.
+        limits: of the axes, in the maker's angles.
+        axis_signs, axis_zeros: from the maker's angles to the chain's.
+        poses: named poses in the maker's angles [rad].
+        counterbalance, counterbalanced_axis: acts on that axis.
+        gravity: gravity vector in the base frame [m/s^2].
+        tool: pose of the tool in the flange frame [m].
+        sources, assumptions: for reports.
+
+    Raises:
+        ValueError: no axis, an unknown hinge, elastic joints in line with an axis and no
+            inertia between them (the mass matrix is singular).
+    """
+    rotation, position, axes, kinds, roles = [], [], [], [], []
+    masses, coms, tensors, carriers, body_names = [], [], [], [], []
+    springs, elastic_names, axis_names = [], [], []
+    hinge_axes, slopes = {}, []
+    pose = np.eye(4)
+    wrist, mark = None, False
+    for part in parts:
+        match part:
+            case Offset():
+                pose = pose @ _pose(part)
+                continue
+            case Body():
+                if roles:  # others rest on the ground
+                    turn = pose[:3, :3]
+                    masses.append(np.asarray(part.mass, float))
+                    coms.append(turn @ np.asarray(part.com, float) + pose[:3, 3])
+                    tensors.append(turn @ np.asarray(part.inertia, float) @ turn.T)
+                    carriers.append(len(roles) - 1)
+                    body_names.append(part.name)
+                continue
+            case WristCentre():
+                mark = True
+                continue
+            case Axis():
+                direction, kind = (0.0, 0.0, 1.0), part.kind
+                role: JointRole = AxisRole(len(axis_names))
+                axis_names.append(part.name)
+                if mark:
+                    wrist, mark = len(roles), False
+            case ElasticJoint():
+                direction, kind = part.axis, JointKind.REVOLUTE
+                role = ElasticRole(len(elastic_names))
+                hinge_axes[part.name] = (len(elastic_names), part.axis)
+                elastic_names.append(part.name)
+                springs.append((part.stiffness, part.damping, part.hardening))
+            case EndSlope():
+                if part.of not in hinge_axes:
+                    raise ValueError(
+                        f"the end slope follows `{part.of}`, which is no elastic joint "
+                        f"in front of it; there are {sorted(hinge_axes)}"
+                    )
+                index, direction = hinge_axes[part.of]
+                kind, role = JointKind.REVOLUTE, SlopeRole(index, len(slopes))
+                slopes.append(part.factor)
+        rotation.append(pose[:3, :3])
+        position.append(pose[:3, 3])
+        axes.append(np.asarray(direction, float))
+        kinds.append(kind)
+        roles.append(role)
+        pose = np.eye(4)
+    if not axis_names:
+        raise ValueError(f"`{name}` has no driven axis: list at least one `Axis`")
+    stiffness, damping, hardening = np.asarray(springs, float).reshape(-1, 3).T
+    robot = ElasticRobot(
+        chain=SerialChain.from_frames(
+            np.stack(rotation),
+            np.stack(position),
+            np.stack(axes),
+            kinds=kinds,
+            tool=pose if tool is None else pose @ np.asarray(tool, float),
+        ),
+        bodies=RigidBodies(
+            np.array(masses),
+            np.array(coms).reshape(-1, 3),
+            np.array(tensors).reshape(-1, 3, 3),
+            tuple(carriers),
+            tuple(body_names),
+        ),
+        payload=no_bodies(),
+        flange=pose,
+        slopes=np.asarray(slopes, float),
+        structure_stiffness=_springs(stiffness, hardening),
+        structure_damping=damping,
+        drives=drives,
+        counterbalance=counterbalance,
+        gravity=gravity,
+        limits=limits,
+        axis_signs=axis_signs,
+        axis_zeros=axis_zeros,
+        poses={key: as_real(value) for key, value in poses.items()},
+        roles=tuple(roles),
+        wrist=len(roles) - 1 if wrist is None else wrist,
+        counterbalanced_axis=counterbalanced_axis,
+        name=name,
+        axis_names=tuple(axis_names),
+        elastic_names=tuple(elastic_names),
+        sources=tuple(sources),
+        assumptions=tuple(assumptions),
+    )
+    check_inertia(robot)
+    return robot
+
+
+def _pose(part: Offset) -> np.ndarray:
+    pose = np.eye(4)
+    pose[:3, 3] = np.asarray(part.position, float)
+    if part.rotation is not None:
+        pose[:3, :3] = np.asarray(part.rotation, float)
+    return pose
+
+
+def _springs(stiffness: np.ndarray, hardening: np.ndarray):
+    if not stiffness.size:
+        return None
+    if not hardening.any():
+        return LinearStiffness(stiffness)
+    return CubicStiffness(stiffness, hardening)

@@ -1,0 +1,245 @@
+"""The elastic robot: chain, bodies, springs, drive trains and what its maker says."""
+
+import dataclasses
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._checks import check_fields, check_values
+from .._custom_types import PerElastic, PerJoint, Transform, Vector3, as_real
+from .._taylor import concatenate, product
+from ..drivetrain import AbstractCounterbalance, DriveTrain
+from ..kinematics import SerialChain
+from ..structure import AbstractStiffness
+from ._bodies import RigidBodies
+from ._reduce import locked_chain
+
+
+@dataclasses.dataclass(frozen=True)
+class AxisRole:
+    """The joint is the driven axis `index`."""
+
+    index: int
+
+
+@dataclasses.dataclass(frozen=True)
+class ElasticRole:
+    """The joint is the elastic coordinate `index`."""
+
+    index: int
+
+
+@dataclasses.dataclass(frozen=True)
+class SlopeRole:
+    """The joint follows the elastic coordinate `index` by the end-slope factor `slope`."""
+
+    index: int
+    slope: int
+
+
+JointRole = AxisRole | ElasticRole | SlopeRole
+
+
+class JointLimits(eqx.Module):
+    """What the axes may do, in the maker's angles.
+
+    Attributes:
+        lower, upper: angles [rad], shape (axes,).
+        velocity: [rad/s].
+        acceleration: [rad/s^2].
+        jerk: [rad/s^3].
+    """
+
+    lower: PerJoint = eqx.field(converter=as_real)
+    upper: PerJoint = eqx.field(converter=as_real)
+    velocity: PerJoint = eqx.field(converter=as_real)
+    acceleration: PerJoint = eqx.field(converter=as_real)
+    jerk: PerJoint = eqx.field(converter=as_real)
+
+    def __check_init__(self):
+        check_fields(self)
+        check_values(
+            "`upper` limits must lie above `lower`", self.upper, self.upper > self.lower
+        )
+        for name in ("velocity", "acceleration", "jerk"):
+            value = getattr(self, name)
+            check_values(f"`{name}` limits must be positive", value, value > 0)
+
+
+class ElasticRobot(eqx.Module):
+    r"""Serial robot with elastic gears and an elastic structure.
+
+    The generalised position is $(q, \eta, \theta)$: joint angles on the output side,
+    structural elastic coordinates, motor angles referred to the output side. The joints of
+    `chain` are driven by $q$ and $\eta$; those at the end of a bending link follow an
+    elastic coordinate by a constant factor (section 2.4.3, second variant).
+
+    Attributes:
+        chain: axes, elastic joints and end-slope joints in their order.
+        bodies: rigid bodies behind the joints.
+        payload: bodies carried by the last link.
+        flange: pose of the flange in the frame behind the last joint's motion [m].
+        slopes: end-slope factors, shape (slopes,).
+        structure_stiffness: spring laws of the elastic coordinates.
+        structure_damping: damping of the elastic coordinates [N m s/rad].
+        drives: one drive train per axis.
+        counterbalance: acts on the axis `counterbalanced_axis`, or `None`.
+        gravity: gravity vector in the base frame [m/s^2].
+        limits: of the axes, in the maker's angles.
+        axis_signs: +1 or -1, shape (axes,): q = sign * maker's angle + zero.
+        axis_zeros: chain angle at the maker's zero [rad].
+        poses: named poses in the maker's angles [rad].
+        roles: what moves each joint of the chain.
+        wrist: joint of the chain whose origin is the wrist centre.
+        counterbalanced_axis: index of the axis.
+        name, axis_names, elastic_names: for tables and messages.
+        sources: where the numbers come from.
+        assumptions: what was assumed, where no source gives a number.
+
+    References:
+        [Reiner2010] (2.38), sections 2.4.1, 2.4.3, 2.5.
+    """
+
+    chain: SerialChain
+    bodies: RigidBodies
+    payload: RigidBodies
+    flange: Transform = eqx.field(converter=as_real)
+    slopes: Float[Array, " slopes"] = eqx.field(converter=as_real)
+    structure_stiffness: AbstractStiffness | None
+    structure_damping: PerElastic = eqx.field(converter=as_real)
+    drives: DriveTrain
+    counterbalance: AbstractCounterbalance | None
+    gravity: Vector3 = eqx.field(converter=as_real)
+    limits: JointLimits
+    axis_signs: PerJoint = eqx.field(converter=as_real)
+    axis_zeros: PerJoint = eqx.field(converter=as_real)
+    poses: dict[str, PerJoint]
+    roles: tuple[JointRole, ...] = eqx.field(static=True)
+    wrist: int = eqx.field(static=True)
+    counterbalanced_axis: int = eqx.field(static=True)
+    name: str = eqx.field(static=True)
+    axis_names: tuple[str, ...] = eqx.field(static=True)
+    elastic_names: tuple[str, ...] = eqx.field(static=True)
+    sources: tuple[str, ...] = eqx.field(static=True, default=())
+    assumptions: tuple[str, ...] = eqx.field(static=True, default=())
+
+    def __check_init__(self):
+        check_fields(self)
+        if len(self.roles) != self.chain.number:
+            raise ValueError(
+                "`roles` must name what moves every joint of the chain: there are "
+                f"{self.chain.number} joints, but {len(self.roles)} roles"
+            )
+        if self.drives.number != self.axes:
+            raise ValueError(
+                "`drives` must hold one drive train per axis: there are "
+                f"{self.axes} axes, but {self.drives.number} drive trains"
+            )
+        check_values(
+            "`structure_damping` must be positive [N m s/rad]",
+            self.structure_damping,
+            self.structure_damping > 0,
+        )
+
+    @property
+    def axes(self) -> int:
+        """Number of driven axes $n_a$."""
+        return sum(isinstance(role, AxisRole) for role in self.roles)
+
+    @property
+    def elastic(self) -> int:
+        """Number of structural elastic coordinates $n_e$."""
+        return sum(isinstance(role, ElasticRole) for role in self.roles)
+
+    @property
+    def has_elastic_gears(self) -> bool:
+        """Whether the motors have coordinates of their own."""
+        return self.drives.stiffness is not None
+
+    def all_bodies(self) -> RigidBodies:
+        """Bodies of the robot and of its payload."""
+        return self.bodies.joined(self.payload)
+
+    def coupling(self) -> Float[Array, "joints coordinates"]:
+        r"""Matrix $G$ of the chain's joints: $s = G\,(q, \eta)$."""
+        constant = np.zeros((len(self.roles), self.axes + self.elastic))
+        rows, columns, slopes = [], [], []
+        for joint, role in enumerate(self.roles):
+            match role:
+                case AxisRole(index):
+                    constant[joint, index] = 1.0
+                case ElasticRole(index):
+                    constant[joint, self.axes + index] = 1.0
+                case SlopeRole(index, slope):
+                    rows.append(joint)
+                    columns.append(self.axes + index)
+                    slopes.append(slope)
+        matrix = jnp.asarray(constant, self.gravity.dtype)
+        if not rows:
+            return matrix
+        return matrix.at[np.array(rows), np.array(columns)].set(
+            self.slopes[np.array(slopes)]
+        )
+
+    def joint_coordinates(self, q, eta):
+        """Coordinates of all joints of the chain, of arrays or series."""
+        stacked = concatenate([q, eta]) if self.elastic else q
+        return product("jn,n->j", self.coupling(), stacked)
+
+    def from_maker(self, angles: PerJoint) -> PerJoint:
+        """Chain angles q [rad] of the maker's angles [rad]."""
+        return self.axis_signs * angles + self.axis_zeros
+
+    def to_maker(self, q: PerJoint) -> PerJoint:
+        """The maker's angles [rad] of chain angles q [rad]."""
+        return self.axis_signs * (q - self.axis_zeros)
+
+    def flexible_joint(self) -> "ElasticRobot":
+        """The same robot with elastic gears and a rigid structure."""
+        return _without_structure(self, self.drives)
+
+    def rigid(self) -> "ElasticRobot":
+        """The same robot with rigid gears and a rigid structure."""
+        return _without_structure(self, self.drives.rigid())
+
+    def with_payload(self, mass, com, inertia) -> "ElasticRobot":
+        """The same robot with another payload.
+
+        Args:
+            mass: [kg]; zero takes the payload off.
+            com: centre of mass in the frame of the flange, shape (3,) [m].
+            inertia: about the centre of mass, in the axes of the flange, shape (3, 3)
+                [kg m^2].
+
+        Raises:
+            ValueError: a positive mass without inertia, or a negative one.
+        """
+        mass, com, inertia = as_real(mass), as_real(com), as_real(inertia)
+        payload = RigidBodies(
+            mass[None], com[None], inertia[None], (self.chain.number - 1,), ("payload",)
+        )
+        return dataclasses.replace(self, payload=payload.moved(self.flange))
+
+
+def _without_structure(robot: ElasticRobot, drives: DriveTrain) -> ElasticRobot:
+    keep = tuple(
+        k for k, role in enumerate(robot.roles) if isinstance(role, AxisRole)
+    )
+    chain, placement = locked_chain(robot.chain, keep)
+    wrist = sum(k <= robot.wrist for k in keep) - 1
+    return dataclasses.replace(
+        robot,
+        chain=chain,
+        bodies=robot.bodies.attached(placement),
+        payload=robot.payload.attached(placement),
+        flange=placement[1][-1] @ robot.flange,
+        slopes=jnp.zeros((0,)),
+        structure_stiffness=None,
+        structure_damping=jnp.zeros((0,)),
+        drives=drives,
+        roles=tuple(robot.roles[k] for k in keep),
+        wrist=wrist,
+        elastic_names=(),
+    )

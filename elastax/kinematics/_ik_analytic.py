@@ -1,0 +1,326 @@
+r"""Closed-form inverse kinematics of six-axis arms with a spherical wrist.
+
+The axes and points of the arm are read at q = 0, so that signs, zero offsets and joint
+conventions do not matter. All eight branches are computed at once, as arrays of shape
+(8,) over shoulder, elbow and wrist.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from .._checks import is_concrete
+from .._custom_types import Matrix3, Scalar, Transform, Vector3
+from ._chain import SerialChain, moving_frames
+from ._joints import JointKind
+from ._se3 import rotation_about
+
+
+# (shoulder, elbow, wrist), the first index slowest, "+" in front of "-"
+_SHOULDER, _ELBOW, _WRIST = np.array(
+    [(b, e, w) for b in (1.0, -1.0) for e in (1.0, -1.0) for w in (1.0, -1.0)]
+).T
+
+
+class SphericalWrist(eqx.Module):
+    """Six-axis arm whose inverse kinematics has a closed form.
+
+    Axis 1 is perpendicular to axis 2, axis 2 parallel to axis 3, and axes 4, 5, 6 meet
+    in one point, each perpendicular to the next. Offsets between the axes 1 and 2, of
+    the wrist, and sideways are free; so are base and tool.
+
+    Attributes:
+        chain: the arm; its parameters are the only ones.
+
+    Raises:
+        ValueError: the geometry of `chain` does not qualify; the message names what
+            does not hold. Not checked where the parameters are traced.
+
+    References:
+        [Reiner2010] 3.6, [KinModell] 3.3.
+    """
+
+    chain: SerialChain
+
+    def __check_init__(self):
+        if self.chain.number != 6 or JointKind.PRISMATIC in self.chain.kinds:
+            raise ValueError(
+                "`chain` must have six revolute joints, but is "
+                f"{[kind.value for kind in self.chain.kinds]}"
+            )
+        if is_concrete(*jax.tree.leaves(self.chain)):
+            with jax.ensure_compile_time_eval():
+                _check_geometry(self.chain)
+
+    @staticmethod
+    def from_chain(chain: SerialChain) -> "SphericalWrist":
+        """The arm `chain`, in whatever convention it was given."""
+        return SphericalWrist(chain)
+
+
+class _Geometry(NamedTuple):
+    """The arm at q = 0, in coordinates (x forward, y along +-axis 2, z along axis 1).
+
+    `signs` are the senses of axes 2 and 3 about y; `shoulder`, `upper` and `fore` are
+    (x, z) pairs; `lateral` is the distance of the wrist from the x-z plane.
+    """
+
+    origin: Vector3
+    axes: Float[Array, "3 3"]
+    arm: Matrix3
+    signs: Float[Array, "2"]
+    shoulder: Float[Array, "2"]
+    upper: Float[Array, "2"]
+    fore: Float[Array, "2"]
+    lateral: Scalar
+    wrist: Matrix3
+    wrist_zero: Scalar
+    tool_to_wrist: Matrix3
+    tool_offset: Vector3
+
+
+def inverse_kinematics(
+    arm: SphericalWrist,
+    pose: Transform,
+    previous: Float[Array, "6"] | None = None,
+) -> tuple[Float[Array, "8 6"], Bool[Array, "8"]]:
+    r"""All joint angles at which the tool has the given pose, joint limits aside.
+
+    Row 4b + 2e + w holds the branch with shoulder b, elbow e and wrist w, where 0 means
+    "+" and 1 means "-". Shoulder +: the arm reaches to the side on which it reaches at
+    q = 0. Elbow +: axis 3 is turned in its positive sense from the stretched arm.
+    Wrist +: axis 5 likewise from the pose that aligns axes 4 and 6.
+
+    [Reiner2010] (3.53) is extended by the offsets between the axes and by the branch
+    b = -1, and reads atan2 with two arguments where the text prints one. [KinModell]
+    (3-96), (3-97) divide by the sine of axis 5; here they hold for a zero sine as well.
+
+    Args:
+        arm: the arm.
+        pose: pose of the tool in the base frame, shape (4, 4) [m].
+        previous: angles [rad] that are kept where they are not determined: axis 1 with
+            the wrist centre on it, axis 4 with the axes 4 and 6 aligned (the branches
+            "-" keep them half a turn away), axis 2 with the wrist centre on it. Zero
+            unless given.
+
+    Returns:
+        Angles in (-pi, pi] [rad], shape (8, 6), and which rows reach the pose, shape
+        (8,). Rows out of reach are finite: the arm stretched or folded towards it.
+
+    References:
+        [Reiner2010] (3.52), (3.53); [KinModell] (3-84) to (3-97).
+    """
+    if previous is None:
+        previous = jnp.zeros((6,), pose.dtype)
+    return _solve(_read_geometry(arm.chain), pose, previous)
+
+
+def select_branch(
+    solutions: Float[Array, "branches joints"],
+    valid: Bool[Array, " branches"],
+    previous: Float[Array, " joints"],
+) -> Float[Array, " joints"]:
+    """The valid solution nearest to the previous angles, without a jump by a turn.
+
+    Args:
+        solutions: angles [rad], shape (branches, joints).
+        valid: which of them reach the pose; if none does, the nearest row is returned.
+        previous: angles to stay close to [rad], of any number of turns.
+
+    Returns:
+        Angles within half a turn of `previous` [rad], shape (joints,).
+    """
+    turns = jnp.round((previous[None] - solutions) / (2 * np.pi))
+    unwrapped = solutions + 2 * np.pi * turns
+    distance = jnp.sum((unwrapped - previous[None]) ** 2, axis=-1)
+    # any valid row is nearer than any other one: each angle is at most pi away
+    penalty = 2 * np.pi**2 * solutions.shape[1]
+    return unwrapped[jnp.argmin(distance + jnp.where(valid, 0.0, penalty))]
+
+
+def inverse_kinematics_path(
+    arm: SphericalWrist, poses: Float[Array, "times 4 4"], start: Float[Array, "6"]
+) -> tuple[Float[Array, "times 6"], Bool[Array, " times"]]:
+    """Joint angles along a path of the tool, each nearest to the last reached ones.
+
+    A path that leaves the workspace returns with the same elbow. Where a sample
+    stretches the arm exactly, the two elbows meet and either may follow.
+
+    Args:
+        arm: the arm.
+        poses: poses of the tool in the base frame, shape (times, 4, 4) [m].
+        start: angles near those of the first pose [rad], shape (6,).
+
+    Returns:
+        Angles without jumps by a turn [rad], shape (times, 6), and which samples are
+        reached, shape (times,).
+    """
+    geometry = _read_geometry(arm.chain)
+
+    def step(previous, pose):
+        solutions, valid = _solve(geometry, pose, previous)
+        q, reached = select_branch(solutions, valid, previous), jnp.any(valid)
+        # out of reach both elbows coincide: only reached angles tell them apart
+        return jnp.where(reached, q, previous), (q, reached)
+
+    return jax.lax.scan(step, start, poses)[1]
+
+
+def _read_geometry(chain: SerialChain) -> _Geometry:
+    frames = moving_frames(chain, jnp.zeros((6,), chain.base.dtype))
+    a, p = frames.axis, frames.position
+    centre = p[3] + a[3] * (a[3] @ (p[4] - p[3]))
+    outward = jnp.cross(a[1], a[0])
+
+    # forward is where the wrist is at q = 0, or else where axis 2 is
+    reach, offset = outward @ (centre - p[0]), outward @ (p[1] - p[0])
+    small = 1e-6 * _norm(centre - p[1])
+    side = jnp.where(jnp.abs(reach) > small, reach, offset)
+    side = jnp.where(jnp.abs(side) > small, side, 1.0)
+    sign = jnp.where(side < 0, -1.0, 1.0)
+    arm = jnp.stack([sign * outward, sign * a[1], a[0]])
+    shoulder, elbow, wrist = (arm @ (point - p[0]) for point in (p[1], p[2], centre))
+
+    wrist_axes = jnp.stack([jnp.cross(a[4], a[3]), a[4], a[3]])
+    zero = jnp.arctan2(wrist_axes[0] @ a[5], wrist_axes[2] @ a[5])
+    rotation = frames.tool_rotation.T
+    return _Geometry(
+        origin=p[0],
+        axes=a[:3],
+        arm=arm,
+        signs=sign * jnp.stack([jnp.ones_like(sign), jnp.sign(a[1] @ a[2])]),
+        shoulder=shoulder[::2],
+        upper=(elbow - shoulder)[::2],
+        fore=(wrist - elbow)[::2],
+        lateral=wrist[1],
+        wrist=wrist_axes,
+        wrist_zero=zero,
+        tool_to_wrist=rotation @ rotation_about(a[4], zero) @ wrist_axes.T,
+        tool_offset=rotation @ (frames.tool_position - centre),
+    )
+
+
+def _solve(g: _Geometry, pose: Transform, previous: Float[Array, "6"]):
+    """Branches of `inverse_kinematics`; b, e, w are the signs of [KinModell] 3.3."""
+    b, e, w = (jnp.asarray(s, pose.dtype) for s in (_SHOULDER, _ELBOW, _WRIST))
+    upper, fore = _norm(g.upper), _norm(g.fore)
+    # lengths are distinguished from zero down to rounding
+    rounding = 1e5 * float(jnp.finfo(pose.dtype).eps)
+    scale = (upper + fore) ** 2
+
+    # wrist centre, [Reiner2010] (3.52a)
+    target = pose[:3, :3]
+    x, y, z = g.arm @ (pose[:3, 3] - target @ g.tool_offset - g.origin)
+
+    # axis 1, [Reiner2010] (3.53b, d)
+    radial = x**2 + y**2 - g.lateral**2
+    u = _sqrt(radial, rounding**2 * scale)
+    tilt = _angle(g.lateral, u, jnp.zeros_like(u), rounding**2 * scale)
+    azimuth = _angle(y, x, previous[0], rounding**2 * scale)
+    q1 = azimuth - jnp.where(b > 0, tilt, np.pi - tilt)
+
+    # axis 3, [Reiner2010] (3.53c, f), with products instead of 1 - D^2
+    reach_x, reach_z = b * u - g.shoulder[0], z - g.shoulder[1]
+    square = reach_x**2 + reach_z**2
+    outer, inner = (upper + fore) ** 2 - square, square - (upper - fore) ** 2
+    fold = jnp.arctan2(
+        _sqrt(outer * inner, (rounding * scale) ** 2), square - upper**2 - fore**2
+    )
+    stretched = jnp.arctan2(
+        g.upper[0] * g.fore[1] - g.upper[1] * g.fore[0], g.upper @ g.fore
+    )
+    q3 = g.signs[1] * stretched + e * fold
+
+    # axis 2, [Reiner2010] (3.53e)
+    sine, cosine = jnp.sin(g.signs[1] * q3), jnp.cos(g.signs[1] * q3)
+    knee_x = g.upper[0] + cosine * g.fore[0] + sine * g.fore[1]
+    knee_z = g.upper[1] + cosine * g.fore[1] - sine * g.fore[0]
+    q2 = g.signs[0] * _angle(
+        reach_x * knee_z - reach_z * knee_x,
+        reach_x * knee_x + reach_z * knee_z,
+        g.signs[0] * previous[1],
+        (rounding * scale) ** 2,
+    )
+
+    # hand axes: Rz(q4) Ry(q5 + zero) Rz(q6), [KinModell] (3-84) to (3-97)
+    about = jax.vmap(rotation_about, (None, 0))
+    turned = about(g.axes[0], q1) @ about(g.axes[1], q2 + g.signs[0] * g.signs[1] * q3)
+    r = jnp.einsum(
+        "ij,njk,kl->nil", g.wrist, jnp.swapaxes(turned, 1, 2), target @ g.tool_to_wrist
+    )
+    kept = previous[3] + jnp.where(w > 0, 0.0, np.pi)
+    q4 = _angle(w * r[:, 1, 2], w * r[:, 0, 2], kept, rounding**2)
+    sine, cosine = jnp.sin(q4), jnp.cos(q4)
+    bend = jnp.arctan2(cosine * r[:, 0, 2] + sine * r[:, 1, 2], r[:, 2, 2])
+    q6 = jnp.arctan2(
+        cosine * r[:, 1, 0] - sine * r[:, 0, 0], cosine * r[:, 1, 1] - sine * r[:, 0, 1]
+    )
+
+    solutions = jnp.stack([q1, q2, q3, q4, bend - g.wrist_zero, q6], axis=1)
+    slack = -rounding * scale
+    valid = (radial >= slack) & (outer >= slack) & (inner >= slack)
+    return _wrap(solutions), valid
+
+
+def _norm(vector):
+    return jnp.sqrt(jnp.sum(vector**2))
+
+
+def _sqrt(x, threshold):
+    """Square root, zero with zero slope up to `threshold`."""
+    positive = x > threshold
+    # a safe operand where the branch is not taken: the slope would be infinite
+    return jnp.where(positive, jnp.sqrt(jnp.where(positive, x, 1.0)), 0.0)
+
+
+def _angle(y, x, kept, threshold):
+    """`arctan2(y, x)`, or `kept` where the squared length is within `threshold`."""
+    free = x**2 + y**2 <= threshold
+    return jnp.where(
+        free, kept, jnp.arctan2(jnp.where(free, 0.0, y), jnp.where(free, 1.0, x))
+    )
+
+
+def _wrap(angle):
+    """Angle in (-pi, pi]."""
+    return angle - 2 * np.pi * jnp.ceil((angle - np.pi) / (2 * np.pi))
+
+
+def _check_geometry(chain: SerialChain, tolerance: float = 1e-6) -> None:
+    """Raise `ValueError` where the axes at q = 0 are not those of `SphericalWrist`."""
+    frames = moving_frames(chain, jnp.zeros((6,), chain.base.dtype))
+    a, p = np.asarray(frames.axis), np.asarray(frames.position)
+    if not np.all(np.isfinite([a, p])):
+        raise ValueError("the geometry of `chain` must be finite, but is not")
+    centre = p[3] + a[3] * (a[3] @ (p[4] - p[3]))
+    scale = max(np.linalg.norm(p[2] - p[1]), np.linalg.norm(centre - p[2]))
+
+    def across(axis, vector):
+        return float(np.linalg.norm(np.cross(axis, vector)))
+
+    def require(what: str, deviation: float) -> None:
+        if not deviation <= tolerance:
+            raise ValueError(
+                f"{what}, but deviates by {deviation:.3g} at q = 0: idealise the "
+                "geometry or solve iteratively with `solve_damped`"
+            )
+
+    require("axis 1 of `chain` must be perpendicular to axis 2", abs(a[0] @ a[1]))
+    require("axis 2 of `chain` must be parallel to axis 3", across(a[1], a[2]))
+    require("axis 4 of `chain` must be perpendicular to axis 5", abs(a[3] @ a[4]))
+    require("axis 5 of `chain` must be perpendicular to axis 6", abs(a[4] @ a[5]))
+    lengths = across(a[1], p[2] - p[1]), across(a[1], centre - p[2])
+    if not min(lengths) > tolerance * scale:
+        raise ValueError(
+            "axes 2 and 3, and axis 3 and the wrist centre of `chain` must lie apart, "
+            f"but the distances are {lengths[0]:.3g} and {lengths[1]:.3g}"
+        )
+    for k in (4, 5):
+        require(
+            "axes 4, 5 and 6 of `chain` must meet in one point (relative to the arm)",
+            float(across(a[k], centre - p[k]) / scale),
+        )

@@ -1,0 +1,74 @@
+"""Geometric Jacobians, and motions of the tool with their time derivatives."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._custom_types import PerJoint
+from .._taylor import Series, concatenate, cross, from_derivatives, leading, product
+from ._chain import MovingFrames, SerialChain, moving_frames
+from ._joints import JointKind
+
+
+def jacobian(chain: SerialChain, q: PerJoint) -> Float[Array, "6 joints"]:
+    """Geometric Jacobian of the tool in the base frame, translation above rotation.
+
+    Args:
+        chain: the chain.
+        q: joint coordinates [rad] or [m], shape (joints,).
+
+    Returns:
+        Shape (6, joints): rows 0 to 2 [m/rad], rows 3 to 5 [rad/rad].
+
+    References:
+        [Reiner2010] (3.54), (3.56) for the translation rows.
+    """
+    return leading(tool_jacobian(chain, moving_frames(chain, q)))
+
+
+def tool_jacobian(chain: SerialChain, frames: MovingFrames):
+    """`jacobian` from frames that are known already; arrays or series."""
+    rotary = jnp.asarray(
+        [[float(kind is JointKind.REVOLUTE)] for kind in chain.kinds],
+        leading(frames.axis).dtype,
+    )
+    tool = concatenate([frames.tool_position[None]] * chain.number)
+    turning = product("ka,kb->ka", frames.axis, rotary)
+    lever = cross(turning, tool - frames.position)
+    sliding = product("ka,kb->ka", frames.axis, 1 - rotary)
+    columns = concatenate([lever + sliding, turning], axis=1)
+    return product("ij,kj->ik", jnp.asarray(np.eye(6), rotary.dtype), columns)
+
+
+def jacobian_derivatives(
+    chain: SerialChain, q_derivatives: Float[Array, "terms joints"]
+) -> Float[Array, "terms 6 joints"]:
+    """Jacobian and its time derivatives along a motion.
+
+    Args:
+        chain: the chain.
+        q_derivatives: joint coordinates and their time derivatives, shape
+            (order + 1, joints).
+
+    Returns:
+        Shape (order + 1, 6, joints); entry k is the k-th time derivative.
+    """
+    frames = moving_frames(chain, from_derivatives(q_derivatives))
+    return tool_jacobian(chain, frames).derivatives()
+
+
+def tool_motion(
+    chain: SerialChain, q: PerJoint, qd: PerJoint, qdd: PerJoint
+) -> tuple[Float[Array, "6"], Float[Array, "6"]]:
+    """Velocity and acceleration of the tool in the base frame.
+
+    Args:
+        chain: the chain.
+        q, qd, qdd: joint coordinates, velocities, accelerations, shape (joints,).
+
+    Returns:
+        Velocity (6,) [m/s, rad/s] and acceleration (6,) [m/s^2, rad/s^2].
+    """
+    value, rate = jax.jvp(lambda x: jacobian(chain, x), (q,), (qd,))
+    return value @ qd, value @ qdd + rate @ qd

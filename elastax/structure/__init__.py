@@ -1,0 +1,18 @@
+"""Elastic structure: spring laws, bearings and beams."""
+
+from ._beam import (
+    HINGE_POSITION as HINGE_POSITION,
+    TIP_FORCE as TIP_FORCE,
+    TIP_MOMENT as TIP_MOMENT,
+    UNIFORM_LOAD as UNIFORM_LOAD,
+    BeamSection as BeamSection,
+    LoadCase as LoadCase,
+    Material as Material,
+    UniformBeam as UniformBeam,
+)
+from ._stiffness import (
+    AbstractStiffness as AbstractStiffness,
+    CubicStiffness as CubicStiffness,
+    LimitedStiffness as LimitedStiffness,
+    LinearStiffness as LinearStiffness,
+)
