@@ -15,6 +15,7 @@ from jaxtyping import Array, Bool, Float
 
 from .._checks import is_concrete
 from .._custom_types import Matrix3, Scalar, Transform, Vector3
+from .._taylor import leading
 from ._chain import SerialChain, moving_frames
 from ._joints import JointKind
 from ._se3 import rotation_about
@@ -172,7 +173,7 @@ def inverse_kinematics_path(
 
 def _read_geometry(chain: SerialChain) -> _Geometry:
     frames = moving_frames(chain, jnp.zeros((6,), chain.base.dtype))
-    a, p = frames.axis, frames.position
+    a, p = leading(frames.axis), leading(frames.position)
     centre = p[3] + a[3] * (a[3] @ (p[4] - p[3]))
     outward = jnp.cross(a[1], a[0])
 
@@ -187,7 +188,7 @@ def _read_geometry(chain: SerialChain) -> _Geometry:
 
     wrist_axes = jnp.stack([jnp.cross(a[4], a[3]), a[4], a[3]])
     zero = jnp.arctan2(wrist_axes[0] @ a[5], wrist_axes[2] @ a[5])
-    rotation = frames.tool_rotation.T
+    rotation = leading(frames.tool_rotation).T
     return _Geometry(
         origin=p[0],
         axes=a[:3],
@@ -200,7 +201,7 @@ def _read_geometry(chain: SerialChain) -> _Geometry:
         wrist=wrist_axes,
         wrist_zero=zero,
         tool_to_wrist=rotation @ rotation_about(a[4], zero) @ wrist_axes.T,
-        tool_offset=rotation @ (frames.tool_position - centre),
+        tool_offset=rotation @ (leading(frames.tool_position) - centre),
     )
 
 

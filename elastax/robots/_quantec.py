@@ -31,8 +31,11 @@ OFFSET = np.array([54.024, -255.55, -200.53, -2.1199, 0.49337, 0.3674])  # N m
 GEAR_STIFFNESS = np.array(
     [4_577_800.0, 7_518_900.0, 4_099_900.0, 360_000.0, 370_000.0, 380_000.0]
 )  # N m/rad
-# dampers of a KR500 from a public file, "measured from EMA"
-GEAR_DAMPING = np.array([1.9e3, 1.4e3, 0.6e3, 1.9e3, 1.4e3, 1.4e3])  # N m s/rad
+# axes 1 to 3: dampers of a KR500 from a public file, "measured from EMA"; axes 4 to 6:
+# damper over spring of that file's axis 4, 1.9e3 / 3.0e6 s, times our springs
+GEAR_DAMPING = np.array(
+    [1.9e3, 1.4e3, 0.6e3, *(1.9e3 / 3.0e6 * GEAR_STIFFNESS[3:])]
+)  # N m s/rad
 
 # material of the arm's castings, handbook values of ductile iron EN-GJS-400
 CAST_IRON = Material(young=169e9, shear=66e9, density=7100.0)
@@ -47,7 +50,7 @@ STRUCTURE_DAMPING = 3.2e-4
 
 ASSUMPTIONS = (
     "gear stiffness of axes 4 to 6: order of magnitude, from a file without source",
-    "gear damping: of a KR500 (larger robot)",
+    "gear damping: of a KR500 (larger robot); axes 4 to 6 in proportion to stiffness",
     "tilt stiffness of axis 1 (1.7e7 N m/rad) and axis 3 (1.0e7 N m/rad): order of "
     "magnitude of the main bearings of such gears",
     "link arm: box section 300 x 180 mm, wall 12 mm, ductile iron; forearm: tube of "

@@ -115,21 +115,24 @@ class SevenSegments(eqx.Module):
         zero = jnp.zeros_like(duration)
         time = jnp.where(t > 0.5 * duration, duration - t, t)
         time = jnp.where(time > 0, time, zero)
-        position, velocity, acceleration = zero, zero, zero
-        for length, jerk in [
-            (self.jerk_time, self.peak_jerk),
-            (self.acceleration_time, zero),
-            (self.jerk_time, -self.peak_jerk),
-            (self.cruise_time, zero),
-        ]:
-            spent = jnp.where(time < length, time, length)
-            time = time - spent
-            position = position + spent * (
-                velocity + spent * (acceleration / 2 + spent * (jerk / 6))
-            )
-            velocity = velocity + spent * (acceleration + spent * (jerk / 2))
-            acceleration = acceleration + spent * jerk
-        return position, velocity, acceleration
+        spent = []
+        lengths = [self.jerk_time, self.acceleration_time, self.jerk_time]
+        for length in [*lengths, self.cruise_time]:
+            spent.append(jnp.where(time < length, time, length))
+            time = time - spent[-1]
+        rising, holding, falling, cruising = spent
+        jerk = self.peak_jerk
+        peak = jerk * rising
+        velocity = rising * (peak / 2)
+        position = rising * (velocity / 3) + holding * (velocity + holding * (peak / 2))
+        velocity = velocity + holding * peak
+        position = position + falling * (
+            velocity + falling * (peak / 2 - falling * (jerk / 6))
+        )
+        velocity = velocity + falling * (peak - falling * (jerk / 2))
+        # The cruise starts without acceleration: a rounded one would add up over it.
+        position = position + cruising * velocity
+        return position, velocity, jerk * (rising - falling)
 
 
 class PointToPoint(eqx.Module):

@@ -283,8 +283,8 @@ def test_jit_vmap_and_loop_agree():
     chain = kuka()
     starts = POSE[None] + jnp.array([0.0, 0.05, -0.1])[:, None]
     target = forward_kinematics(chain, POSE)
-    solve = lambda q: solve_damped(chain, target, q, damping=DAMPING).value
-    loop = jnp.stack([jax.jit(solve)(q) for q in starts])
+    solve = jax.jit(lambda q: solve_damped(chain, target, q, damping=DAMPING).value)
+    loop = jnp.stack([solve(q) for q in starts])
     assert_close(jax.jit(jax.vmap(solve))(starts), loop, rtol=0.0, atol=1e-10)
 
 
