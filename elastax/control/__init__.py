@@ -1,5 +1,10 @@
-"""Controllers at the motors."""
+"""Controllers at the motors, and runs of a feed-forward on the elastic plant."""
 
+from ._comparison import (
+    Run as Run,
+    rigid_tool_path as rigid_tool_path,
+    run_feedforward as run_feedforward,
+)
 from ._motor import (
     CascadeMotorControl as CascadeMotorControl,
     IdealMotorControl as IdealMotorControl,

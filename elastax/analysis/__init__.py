@@ -1,0 +1,7 @@
+"""Figures that judge a motion."""
+
+from ._judgement import (
+    Judgement as Judgement,
+    criterion as criterion,
+    judge as judge,
+)
