@@ -7,7 +7,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-PYTEST_ARGS ?=
+# two processes; the tests of one file stay together and share what they compile
+PYTEST_ARGS ?= -n 2 --dist loadfile
 
 .PHONY: demo test slow lint clean
 

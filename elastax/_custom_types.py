@@ -2,6 +2,7 @@
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 
@@ -15,11 +16,19 @@ Times = Float[Array, " times"]
 
 
 def as_real(value):
-    """`value` as a floating-point array; integers take the default float type."""
+    """`value` as a floating-point array of a definite type.
+
+    Numbers and integer arrays take the default float type.
+    """
+    default = jax.dtypes.canonicalize_dtype(jnp.float64)
+    if isinstance(value, int | float | np.ndarray | np.generic):
+        array = np.asarray(value)
+        real = np.issubdtype(array.dtype, np.floating)
+        # unlike `jnp.asarray`, this compiles nothing: records hold dozens of arrays
+        return jax.device_put(array if real else array.astype(default))
     array = jnp.asarray(value)
-    if jnp.issubdtype(array.dtype, jnp.floating):
-        return array
-    return array.astype(jax.dtypes.canonicalize_dtype(jnp.float64))
+    real = jnp.issubdtype(array.dtype, jnp.floating)
+    return jnp.asarray(array, array.dtype if real else default)
 
 
 def as_optional_real(value):

@@ -1,9 +1,9 @@
 r"""Truncated Taylor arithmetic: a quantity together with its time derivatives.
 
-A `Series` of order $p$ holds the coefficients $x_k = x^{(k)}(t_0)/k!$, $k = 0..p$, along
-its leading axis. Whatever is written with the functions of this module runs on plain
-arrays and on series alike, so that a recursion gives its own time derivatives: the
-operation count grows with $p^2$, the size of the program hardly at all.
+A `Series` of order $p$ holds the coefficients $x_k = x^{(k)}(t_0)/k!$, $k = 0..p$,
+along its leading axis. Whatever is written with the functions of this module runs on
+plain arrays and on series alike, so that a recursion gives its own time derivatives:
+the operation count grows with $p^2$, the size of the program hardly at all.
 
 Sums and products follow the Leibniz rule; smooth functions of one argument are composed
 from the derivatives of the function at the leading coefficient.
@@ -12,6 +12,7 @@ from the derivatives of the function at the leading coefficient.
 import functools
 import math
 from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -97,19 +98,19 @@ def from_derivatives(derivatives: Float[Array, " terms *shape"]) -> Series:
     return Series(derivatives / _factorials(order, ndim))
 
 
-def leading(x):
+def leading(x: Any) -> Any:
     """Value at the expansion point of an array or a series."""
     return x.coefficients[0] if isinstance(x, Series) else x
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def _leibniz(order: int) -> np.ndarray:
     """Constant tensor with ones where k = i + j."""
     i = np.arange(order + 1)
     return (i[:, None, None] == i[None, :, None] + i[None, None, :]).astype(float)
 
 
-def product(subscripts: str, a, b):
+def product(subscripts: str, a: Any, b: Any) -> Any:
     """`jnp.einsum(subscripts, a, b)` where either operand may be a `Series`.
 
     Of two series the product has the lower order.
@@ -142,14 +143,14 @@ def product(subscripts: str, a, b):
     )
 
 
-def linear(function: Callable, x):
+def linear(function: Callable, x: Any) -> Any:
     """Apply a linear map, acting on arrays, to an array or to each coefficient."""
     if isinstance(x, Series):
         return Series(jax.vmap(function)(x.coefficients))
     return function(x)
 
 
-def concatenate(parts, axis: int = 0):
+def concatenate(parts: Any, axis: int = 0) -> Any:
     """`jnp.concatenate` of arrays, or of series of equal order."""
     if isinstance(parts[0], Series):
         return Series(
@@ -164,7 +165,7 @@ for _i, _j, _k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
     _LEVI_CIVITA[_i, _k, _j] = -1.0
 
 
-def skew(vector):
+def skew(vector: Any) -> Any:
     r"""Matrix $\tilde a$ with $\tilde a b = a \times b$, shape (..., 3, 3).
 
     References:
@@ -174,13 +175,13 @@ def skew(vector):
     return linear(lambda v: -jnp.tensordot(v, tensor, axes=(-1, 2)), vector)
 
 
-def cross(a, b):
+def cross(a: Any, b: Any) -> Any:
     """Cross product along the last axis of arrays or series of equal shape."""
     letters = "abcdef"[: a.ndim - 1]
     return product(f"{letters}uv,{letters}v->{letters}u", skew(a), b)
 
 
-def compose(function: Callable, x):
+def compose(function: Callable, x: Any) -> Any:
     """`function(x)` for a smooth function that acts on every element by itself.
 
     The derivatives of `function` at the leading coefficient come from nested `jvp`; the
@@ -208,19 +209,21 @@ def _derivative(function: Callable) -> Callable:
     return lambda x: jax.jvp(function, (x,), (jnp.ones_like(x),))[1]
 
 
-def sin_cos(x):
+def sin_cos(x: Any) -> tuple[Any, Any]:
     """Sine and cosine of an array or a series, by their coupled recurrence."""
     if not isinstance(x, Series):
         return jnp.sin(x), jnp.cos(x)
     a = x.coefficients
+    zero = jnp.zeros_like(a[0])
     sine, cosine = [jnp.sin(a[0])], [jnp.cos(a[0])]
     for k in range(1, x.order + 1):
-        sine.append(sum(i * a[i] * cosine[k - i] for i in range(1, k + 1)) / k)
-        cosine.append(-sum(i * a[i] * sine[k - i] for i in range(1, k + 1)) / k)
+        terms = [(i * a[i], k - i) for i in range(1, k + 1)]
+        sine.append(sum((r * cosine[j] for r, j in terms), zero) / k)
+        cosine.append(-sum((r * sine[j] for r, j in terms), zero) / k)
     return Series(jnp.stack(sine)), Series(jnp.stack(cosine))
 
 
-def solve_positive(matrix, right):
+def solve_positive(matrix: Any, right: Any) -> Any:
     r"""Solution of $A x = b$ for a symmetric positive definite $A$ and a vector $b$.
 
     For series $A_0 x_k = b_k - \sum_{i=1}^{k} A_i x_{k-i}$: one factorisation.

@@ -1,4 +1,4 @@
-"""How well a feed-forward leaves the tool still: the figures of chapter 6, defined once."""
+"""How well a feed-forward leaves the tool still: the figures of chapter 6."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -22,7 +22,8 @@ class Judgement(eqx.Module):
         path_error_integral_relative: the same, the error at t = 0 subtracted [m s].
         path_error_max: largest path error over that time [m].
         path_error_max_relative: the same, the error at t = 0 subtracted [m].
-        settling_time: from t_0 until the tool stays within 0.1 mm of its final place [s].
+        settling_time: from t_0 until the tool stays within 0.1 mm of its final place
+            [s].
         peak_motor_torque: largest magnitudes, motor side [N m], shape (axes,).
         peak_gear_torque: largest magnitudes, output side [N m], shape (axes,).
         path_error: over time [m], shape (times,).
@@ -91,8 +92,8 @@ def criterion(
 ) -> Scalar:
     r"""Criterion C, [m/s].
 
-    $C = \sum_{k=1}^{3}\int_{t_0}^{t_0+T} |a_k(t) - \bar a_k|\,dt$, the mean over the same
-    window; exact for accelerations that are linear between the samples.
+    $C = \sum_{k=1}^{3}\int_{t_0}^{t_0+T} |a_k(t) - \bar a_k|\,dt$, the mean over the
+    same window; exact for accelerations that are linear between the samples.
 
     Args:
         times: uniform [s], reaching over the window.

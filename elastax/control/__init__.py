@@ -3,6 +3,7 @@
 from ._comparison import (
     Run as Run,
     rigid_tool_path as rigid_tool_path,
+    run_command as run_command,
     run_feedforward as run_feedforward,
 )
 from ._motor import (

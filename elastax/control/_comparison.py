@@ -62,7 +62,25 @@ def run_feedforward(
         [Reiner2010] chapter 6: the same filtered reference for every inverse.
     """
     command = inverse.feedforward(model, reference)
+    simulation, judgement = run_command(
+        plant, command, reference, controller, **options
+    )
+    return Run(command, simulation, judgement)
+
+
+def run_command(
+    plant: ElasticRobot,
+    command: MotorCommand,
+    reference: Reference,
+    controller: AbstractMotorController,
+    **options,
+) -> tuple[SimulationResult, Judgement]:
+    """Simulation of a command on the plant, and its figures.
+
+    Args:
+        plant, reference, controller, options: as for `run_feedforward`.
+        command: of any inverse.
+    """
     simulation = simulate(plant, command, controller, **options)
     path = rigid_tool_path(plant, reference)
-    judgement = judge(plant, simulation, path, reference.rest_time())
-    return Run(command, simulation, judgement)
+    return simulation, judge(plant, simulation, path, reference.rest_time())

@@ -55,8 +55,8 @@ def equations_of_motion(
             without effect if the gears are rigid.
 
     References:
-        [Reiner2010] (2.38). The gyroscopic coupling of the rotors is neglected there and
-        here.
+        [Reiner2010] (2.38). The gyroscopic coupling of the rotors is neglected there
+        and here.
     """
     n = robot.axes
     mass, bias = multibody(robot, q, eta, qd, etad)

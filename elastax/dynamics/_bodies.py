@@ -100,7 +100,9 @@ def _check_inertia(bodies: RigidBodies) -> None:
         if m == 0 and not inertia.any():
             continue
         if not np.allclose(inertia, inertia.T, rtol=0, atol=1e-9 * abs(inertia).max()):
-            raise ValueError(f"the inertia of `{name}` must be symmetric, but is {inertia}")
+            raise ValueError(
+                f"the inertia of `{name}` must be symmetric, but is {inertia}"
+            )
         moments = np.linalg.eigvalsh(inertia)
         if m > 0 and name == "payload" and not inertia.any():
             raise ValueError(

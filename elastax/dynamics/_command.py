@@ -37,7 +37,8 @@ class MotorCommand(eqx.Module):
 
     Attributes:
         times: [s], shape (times,), uniform.
-        theta, thetad, thetadd: motor angles [rad], speeds, accelerations, (times, axes).
+        theta, thetad, thetadd: motor angles [rad], speeds, accelerations,
+            (times, axes).
         tau_m: motor torques on the output side [N m], (times, axes).
         tau_a: torques behind the gears [N m], (times, axes).
         q: joint angles behind the gears [rad], (times, axes).
@@ -102,7 +103,7 @@ class CommandInterpolant(eqx.Module):
         step = command.times[1] - command.times[0]
 
         def slopes(values):
-            return jnp.gradient(values, axis=0) / step
+            return jnp.asarray(jnp.gradient(values, axis=0)) / step
 
         self.angle = UniformHermite(start, step, command.theta, command.thetad)
         self.speed = UniformHermite(start, step, command.thetad, command.thetadd)

@@ -1,4 +1,4 @@
-"""Energies of the elastic robot: the definition that everything else must agree with."""
+"""Energies of the elastic robot: what everything else must agree with."""
 
 import jax
 import jax.numpy as jnp
@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._custom_types import PerElastic, PerJoint, Scalar
+from .._taylor import leading
 from ..kinematics import moving_frames
 from ._robot import ElasticRobot
 
@@ -17,8 +18,10 @@ def body_poses(
     frames = moving_frames(robot.chain, robot.joint_coordinates(q, eta))
     bodies = robot.all_bodies()
     index = np.array(bodies.joint, int)
-    rotation = frames.rotation[index]
-    com = frames.position[index] + jnp.einsum("kab,kb->ka", rotation, bodies.com)
+    rotation = leading(frames.rotation)[index]
+    com = leading(frames.position)[index] + jnp.einsum(
+        "kab,kb->ka", rotation, bodies.com
+    )
     return rotation, com
 
 
@@ -84,17 +87,29 @@ def potential_energy(
 
 def dissipated_power(
     robot: ElasticRobot,
+    q: PerJoint,
     qd: PerJoint,
     etad: PerElastic,
     thetad: PerJoint,
 ) -> Scalar:
-    """Power [W] lost in friction, gear dampers and structural dampers."""
+    """Power [W] lost in friction, gears, structure and the counterbalance's rod.
+
+    Args:
+        robot: the robot.
+        q: joint angles [rad], shape (axes,); they place the counterbalance.
+        qd, etad, thetad: velocities of joints, structure and motors.
+    """
     drives = robot.drives
     if not robot.has_elastic_gears:
         thetad = qd
     slip = qd - thetad
+    rod = jnp.zeros((), qd.dtype)
+    if robot.counterbalance is not None:
+        k = robot.counterbalanced_axis
+        rod = -robot.counterbalance.damping_torque(q[k], qd[k]) * qd[k]
     return (
-        jnp.sum(drives.motor_friction.torque(thetad) * thetad)
+        rod
+        + jnp.sum(drives.motor_friction.torque(thetad) * thetad)
         + jnp.sum(drives.joint_friction.torque(qd) * qd)
         + jnp.sum(drives.damping * slip**2)
         + jnp.sum(robot.structure_damping * etad**2)

@@ -1,5 +1,7 @@
 """Forces that friction, counterbalance and structural springs add to the bodies'."""
 
+import jax.numpy as jnp
+
 from .._taylor import compose, concatenate
 from ._robot import ElasticRobot
 
@@ -17,8 +19,11 @@ def applied_forces(robot: ElasticRobot, q, eta, qd, etad):
     """
     joint = compose(robot.drives.joint_friction.torque, qd)
     if robot.counterbalance is not None:
-        axis = robot.counterbalanced_axis
-        support = compose(robot.counterbalance.torque, q[axis : axis + 1])
+        axis, cylinder = robot.counterbalanced_axis, robot.counterbalance
+        angle, speed = q[axis : axis + 1], qd[axis : axis + 1]
+        # the rod's damping is linear in the speed: its torque at unit speed is a factor
+        factor = compose(lambda a: cylinder.damping_torque(a, jnp.ones_like(a)), angle)
+        support = compose(cylinder.torque, angle) + factor * speed
         joint = concatenate(
             [joint[:axis], joint[axis : axis + 1] - support, joint[axis + 1 :]]
         )

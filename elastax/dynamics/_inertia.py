@@ -10,8 +10,8 @@ from ._robot import AxisRole, ElasticRobot, ElasticRole
 def check_inertia(robot: ElasticRobot) -> None:
     """Refuse a robot whose mass matrix is singular.
 
-    A hinge in line with an axis and no body between them moves nothing: the torque that
-    accelerates it is undefined. Lump such a hinge into the gear.
+    A hinge in line with an axis and no body between them moves nothing: the torque
+    that accelerates it is undefined. Lump such a hinge into the gear.
 
     Raises:
         ValueError: the mass matrix at a pose without special geometry is singular; the
@@ -31,8 +31,8 @@ def check_inertia(robot: ElasticRobot) -> None:
         still = [name for name, p in zip(names, part) if p > 0.3 * part.max()]
     raise ValueError(
         f"the mass matrix of `{robot.name}` is singular: no inertia lies between or "
-        f"behind the joints {', '.join(still)}. Lump a hinge that is in line with an axis "
-        "into its gear, or attach a body"
+        f"behind the joints {', '.join(still)}. Lump a hinge that is in line with an "
+        "axis into its gear, or attach a body"
     )
 
 
@@ -41,9 +41,14 @@ def _mass_matrix(robot: ElasticRobot) -> np.ndarray:
     number = robot.axes + robot.elastic
     values = 0.3 + 0.17 * np.arange(number)
     slopes = np.asarray(robot.slopes)
+    groups = (robot.bodies, robot.payload)
     frames = robot.chain.joints.frames()
     before, axis, after = map(np.asarray, (frames.before, frames.axis, frames.after))
-    bodies = robot.bodies.joined(robot.payload)
+    mass, com, inertia = (
+        np.concatenate([np.asarray(getattr(bodies, name)) for bodies in groups])
+        for name in ("mass", "com", "inertia")
+    )
+    carriers = np.array([joint for bodies in groups for joint in bodies.joint])
     pose, screws, weights, total = np.asarray(robot.chain.base), [], [], 0.0
     for joint, role in enumerate(robot.roles):
         match role:
@@ -58,15 +63,15 @@ def _mass_matrix(robot: ElasticRobot) -> np.ndarray:
         screws.append((pose[:3, 3], direction, robot.chain.kinds[joint]))
         weights.append((column, factor))
         pose = pose @ _motion(robot.chain.kinds[joint], axis[joint], values[column])
-        for k in np.flatnonzero(np.array(bodies.joint) == joint):
-            com = pose[:3, :3] @ np.asarray(bodies.com[k]) + pose[:3, 3]
+        for k in np.flatnonzero(carriers == joint):
+            centre = pose[:3, :3] @ com[k] + pose[:3, 3]
             linear, angular = np.zeros((3, number)), np.zeros((3, number))
             for (point, z, kind), (c, f) in zip(screws, weights):
                 rotary = kind is JointKind.REVOLUTE
-                linear[:, c] += f * (np.cross(z, com - point) if rotary else z)
+                linear[:, c] += f * (np.cross(z, centre - point) if rotary else z)
                 angular[:, c] += f * z * rotary
-            tensor = pose[:3, :3] @ np.asarray(bodies.inertia[k]) @ pose[:3, :3].T
-            total = total + float(bodies.mass[k]) * linear.T @ linear
+            tensor = pose[:3, :3] @ inertia[k] @ pose[:3, :3].T
+            total = total + mass[k] * linear.T @ linear
             total = total + angular.T @ tensor @ angular
         pose = pose @ after[joint]
     return total + np.zeros((number, number))

@@ -28,8 +28,8 @@ def lagrange_forces(
 
     Args:
         robot: the robot.
-        q, eta, theta, qd, etad, thetad, qdd, etadd, thetadd: the motion; for rigid gears
-            the motors follow the joints and the last force is zero.
+        q, eta, theta, qd, etad, thetad, qdd, etadd, thetadd: the motion; for rigid
+            gears the motors follow the joints and the last force is zero.
 
     Returns:
         Forces of joints, structure and motors [N m].
@@ -50,6 +50,9 @@ def lagrange_forces(
     force = jax.grad(lagrangian, argnums=0)(x, xd)
     drives = robot.drives
     lost_q = drives.joint_friction.torque(qd)
+    if robot.counterbalance is not None:
+        k = robot.counterbalanced_axis
+        lost_q = lost_q.at[k].add(-robot.counterbalance.damping_torque(q[k], qd[k]))
     lost_eta = robot.structure_damping * etad
     if robot.has_elastic_gears:
         gear = drives.damping * (qd - thetad)

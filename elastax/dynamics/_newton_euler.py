@@ -1,8 +1,8 @@
 r"""Newton-Euler recursion of the whole chain, as sums of screws.
 
-Every joint is a screw $S_k = (p_k \times z_k,\; z_k)$ in the base frame, referred to the
-base origin. In one common frame the recursions of (2.27) to (2.31) are plain sums over the
-joints in front of a link or the bodies behind a joint,
+Every joint is a screw $S_k = (p_k \times z_k,\; z_k)$ in the base frame, referred to
+the base origin. In one common frame the recursions of (2.27) to (2.31) are plain sums
+over the joints in front of a link or the bodies behind a joint,
 
 $V_k = \sum_{i \le k} S_i \dot s_i$,
 $A_k = \sum_{i \le k} (S_i \ddot s_i + V_i \times S_i \dot s_i) - (g, 0)$,
@@ -11,6 +11,8 @@ $\tau_k = S_k^T \sum_{b \ge k} F_b$,
 so that the program does not grow with the number of joints. It runs on arrays and on
 `Series`; the latter gives the time derivatives of the torques along a motion.
 """
+
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -109,19 +111,19 @@ def generalised_forces(robot: ElasticRobot, q, eta, qd, etad, qdd, etadd):
 
 def inverse_dynamics(
     robot: ElasticRobot,
-    q: PerJoint,
-    qd: PerJoint,
-    qdd: PerJoint,
-    eta: PerElastic | None = None,
-    etad: PerElastic | None = None,
-    etadd: PerElastic | None = None,
-) -> tuple[PerJoint, PerElastic]:
+    q: PerJoint | Series,
+    qd: PerJoint | Series,
+    qdd: PerJoint | Series,
+    eta: PerElastic | Series | None = None,
+    etad: PerElastic | Series | None = None,
+    etadd: PerElastic | Series | None = None,
+) -> tuple[Any, Any]:
     r"""Torques that the links need for a given motion, behind the gears.
 
-    $\hat\tau_a = M_{aa}\ddot q + M_{ae}\ddot\eta + h_a$ with the gear's spring and damper
-    left out of $h_a$ (motor angle equal to joint angle), and $\hat\tau_e$ alike for the
-    elastic coordinates, which would have to act on the structure from outside: zero in
-    free motion.
+    $\hat\tau_a = M_{aa}\ddot q + M_{ae}\ddot\eta + h_a$ with the gear's spring and
+    damper left out of $h_a$ (motor angle equal to joint angle), and $\hat\tau_e$ alike
+    for the elastic coordinates, which would have to act on the structure from outside:
+    zero in free motion.
 
     Args:
         robot: the robot.
@@ -147,7 +149,7 @@ def inverse_dynamics(
     return total[:n] + joint, total[n:] + structure
 
 
-def _zeros_like(q, size: int):
+def _zeros_like(q: Any, size: int) -> Any:
     if isinstance(q, Series):
         return Series(jnp.zeros((q.order + 1, size), leading(q).dtype))
     return jnp.zeros((size,), q.dtype)
@@ -158,8 +160,8 @@ def multibody(
 ) -> tuple[Float[Array, "coordinates coordinates"], Float[Array, " coordinates"]]:
     """Mass matrix and bias forces of the bodies, coordinates (q, eta).
 
-    The mass matrix comes from composite bodies: the inertia of all bodies behind a joint
-    about the base origin, moved by that joint's screw.
+    The mass matrix comes from composite bodies: the inertia of all bodies behind a
+    joint about the base origin, moved by that joint's screw.
 
     Args:
         robot: the robot.
@@ -175,8 +177,10 @@ def multibody(
     twist, acceleration = chain_motion(robot, screws, sd, jnp.zeros_like(sd))
     bodies = robot.all_bodies()
     index = np.array(bodies.joint, int)
-    rotation = frames.rotation[index]
-    com = frames.position[index] + jnp.einsum("kab,kb->ka", rotation, bodies.com)
+    rotation = leading(frames.rotation)[index]
+    com = leading(frames.position)[index] + jnp.einsum(
+        "kab,kb->ka", rotation, bodies.com
+    )
     tensor = jnp.einsum("kab,kbc,kdc->kad", rotation, bodies.inertia, rotation)
     v, w = twist[index, :3], twist[index, 3:]
     a, alpha = acceleration[index, :3], acceleration[index, 3:]

@@ -122,9 +122,9 @@ def assemble(
 ) -> ElasticRobot:
     """Elastic robot from its parts, listed from the base to the flange.
 
-    Frames are carried along: each part stands in the frame that the parts in front of it
-    have led to. Bodies belong to the joint in front of them. The parts hold numbers; to
-    differentiate by a parameter, replace the leaf of the assembled robot.
+    Frames are carried along: each part stands in the frame that the parts in front of
+    it have led to. Bodies belong to the joint in front of them. The parts hold numbers;
+    to differentiate by a parameter, replace the leaf of the assembled robot.
 
     Args:
         name: of the robot.
@@ -139,8 +139,8 @@ def assemble(
         sources, assumptions: for reports.
 
     Raises:
-        ValueError: no axis, an unknown hinge, elastic joints in line with an axis and no
-            inertia between them (the mass matrix is singular).
+        ValueError: no axis, an unknown hinge, elastic joints in line with an axis and
+            no inertia between them (the mass matrix is singular).
     """
     rotation, position, axes, kinds, roles = [], [], [], [], []
     masses, coms, tensors, carriers, body_names = [], [], [], [], []

@@ -33,7 +33,7 @@ class ElasticRole:
 
 @dataclasses.dataclass(frozen=True)
 class SlopeRole:
-    """The joint follows the elastic coordinate `index` by the end-slope factor `slope`."""
+    """The joint follows the elastic coordinate `index` by the end slope `slope`."""
 
     index: int
     slope: int
@@ -72,9 +72,9 @@ class ElasticRobot(eqx.Module):
     r"""Serial robot with elastic gears and an elastic structure.
 
     The generalised position is $(q, \eta, \theta)$: joint angles on the output side,
-    structural elastic coordinates, motor angles referred to the output side. The joints of
-    `chain` are driven by $q$ and $\eta$; those at the end of a bending link follow an
-    elastic coordinate by a constant factor (section 2.4.3, second variant).
+    structural elastic coordinates, motor angles referred to the output side. The joints
+    of `chain` are driven by $q$ and $\eta$; those at the end of a bending link follow
+    an elastic coordinate by a constant factor (section 2.4.3, second variant).
 
     Attributes:
         chain: axes, elastic joints and end-slope joints in their order.
@@ -224,9 +224,7 @@ class ElasticRobot(eqx.Module):
 
 
 def _without_structure(robot: ElasticRobot, drives: DriveTrain) -> ElasticRobot:
-    keep = tuple(
-        k for k, role in enumerate(robot.roles) if isinstance(role, AxisRole)
-    )
+    keep = tuple(k for k, role in enumerate(robot.roles) if isinstance(role, AxisRole))
     chain, placement = locked_chain(robot.chain, keep)
     wrist = sum(k <= robot.wrist for k in keep) - 1
     return dataclasses.replace(

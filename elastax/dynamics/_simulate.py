@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from .._custom_types import PerElastic, PerJoint, Times
+from .._taylor import leading
 from ..kinematics import moving_frames, transform
 from ._block_form import forward_dynamics
 from ._command import CommandInterpolant, MotorCommand, MotorSetpoint
@@ -120,7 +121,9 @@ def simulate(
         ValueError: the plant's gears are rigid.
     """
     if not robot.has_elastic_gears:
-        raise ValueError("simulate a robot with elastic gears; `rigid()` took them away")
+        raise ValueError(
+            "simulate a robot with elastic gears; `rigid()` took them away"
+        )
     times = command.times if times is None else times
     setpoint = CommandInterpolant(command)
     n, m = robot.axes, robot.elastic
@@ -176,13 +179,13 @@ def simulate(
         pose, velocity, acceleration, wrist = tool_state(
             robot, q, eta, qd, etad, qdd, etadd
         )
-        return SimulationResult(
-            t, q, eta, theta, qd, etad, thetad, qdd, etadd, thetadd, tau_m, -gear,
-            pose, velocity, acceleration, wrist, jnp.zeros((), int),
+        return (
+            q, eta, theta, qd, etad, thetad, qdd, etadd, thetadd, tau_m, -gear,
+            pose, velocity, acceleration, wrist,
         )  # fmt: skip
 
-    result = jax.vmap(observe)(times, solution.ys)
-    return eqx.tree_at(lambda r: r.steps, result, solution.stats["num_steps"])
+    observed = jax.vmap(observe)(times, solution.ys)
+    return SimulationResult(times, *observed, steps=solution.stats["num_steps"])
 
 
 def resting_state(
@@ -190,8 +193,8 @@ def resting_state(
 ) -> tuple[PerJoint, PerElastic, PerJoint]:
     """Static equilibrium of robot and loop: q, eta, theta [rad].
 
-    The motors give way by their loop's static stiffness; a fixed number of substitutions
-    converges by the ratio of the gravity's stiffness to the loop's.
+    The motors give way by their loop's static stiffness; a fixed number of
+    substitutions converges by the ratio of the gravity's stiffness to the loop's.
     """
     inertia = robot.drives.reflected_inertia()
     zero = jnp.zeros_like(setpoint.theta)
@@ -238,5 +241,5 @@ def tool_state(
 
     velocity, acceleration = at(frames.tool_position, robot.chain.number - 1)
     _, wrist = at(frames.position[robot.wrist], robot.wrist)
-    pose = transform(frames.tool_rotation, frames.tool_position)
+    pose = transform(leading(frames.tool_rotation), leading(frames.tool_position))
     return pose, velocity, acceleration, wrist[:3]

@@ -1,17 +1,18 @@
 r"""ASIM, the approximate inverse model of the structurally elastic robot.
 
-The exact inverse of the elastic robot is unstable. Figure 3.21 of the text replaces it by
-a chain of stable steps:
+The exact inverse of the elastic robot is unstable. Figure 3.21 of the text replaces it
+by a chain of stable steps:
 
-1. a rigid parallel model on the reference gives the torques $\hat\tau_e$ in the structure,
+1. a rigid parallel model on the reference gives the torques $\hat\tau_e$ in the
+   structure,
 2. the structure's springs and dampers answer with the deformations $\hat\eta$,
 3. one damped least-squares step corrects the joint angles for the displaced tool,
 4. the equations of motion of the deformed, corrected robot give the torques behind the
    gears,
 5. the drive trains are inverted exactly.
 
-Steps 1, 3, 4 and 5 are functions of one sample and its derivatives; only the deformations,
-the torsions of the gears and the filtered damping factor have a memory.
+Steps 1, 3, 4 and 5 are functions of one sample and its derivatives; only the
+deformations, the torsions of the gears and the filtered damping factor have a memory.
 """
 
 import equinox as eqx
@@ -85,9 +86,7 @@ class ASIM(AbstractInverse):
         factor, _ = self.damping.step(damping, smallest, jnp.zeros_like(dt), 3)
         _, load = self._loaded(model, sample, forcing, eta, factor)
         drive = DriveState(resting_torsion(model.drives, load), load.coefficients)
-        return _State(
-            eta, forcing.coefficients, drive, damping, dt, jnp.zeros_like(dt)
-        )
+        return _State(eta, forcing.coefficients, drive, damping, dt, jnp.zeros_like(dt))
 
     def step(
         self, model: ElasticRobot, state: _State, sample: Derivatives
@@ -165,8 +164,8 @@ class ASIM(AbstractInverse):
 def structure_torque(model: ElasticRobot, sample: Derivatives) -> Series:
     r"""Torques in the structure of the rigid parallel model, with two derivatives.
 
-    $-\hat\tau_e = M_{ea}\ddot q_r + h_e^*$ at $\eta = \dot\eta = 0$; $M_{ee}\ddot\eta$ is
-    neglected.
+    $-\hat\tau_e = M_{ea}\ddot q_r + h_e^*$ at $\eta = \dot\eta = 0$;
+    $M_{ee}\ddot\eta$ is neglected.
 
     References:
         [Reiner2010] (3.76); its sign is that of (3.78), conventions 8 and 10 of the
@@ -205,9 +204,7 @@ def advance_deformation(
     return advance(spring, model.structure_damping, eta, before, after, dt)
 
 
-def deformation_series(
-    model: ElasticRobot, eta: PerElastic, forcing: Series
-) -> Series:
+def deformation_series(model: ElasticRobot, eta: PerElastic, forcing: Series) -> Series:
     """Deformations with three derivatives.
 
     References:

@@ -1,6 +1,7 @@
 """Correction of the joint angles for a deformed structure."""
 
 import abc
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -13,6 +14,7 @@ from .._taylor import Series, compose, concatenate, leading, linear, product
 from ..dynamics import AxisRole, ElasticRobot
 from ..kinematics import (
     CorrectionLimiter,
+    MovingFrames,
     damped_least_squares,
     moving_frames,
     row_weights,
@@ -25,7 +27,9 @@ class AbstractCorrection(eqx.Module):
     """Which error of the tool is corrected, and by which axes."""
 
     @abc.abstractmethod
-    def linearised(self, model: ElasticRobot, q, eta, target):
+    def linearised(
+        self, model: ElasticRobot, q: Any, eta: Any, target: MovingFrames
+    ) -> tuple[Any, Any]:
         """Jacobian and error of the deformed robot at (q, eta), in one unit.
 
         Args:
@@ -38,12 +42,12 @@ class AbstractCorrection(eqx.Module):
         """
 
     @abc.abstractmethod
-    def spread(self, model: ElasticRobot, correction):
+    def spread(self, model: ElasticRobot, correction: Any) -> Any:
         """Correction of all axes (axes,) from that of the moving ones."""
 
     @abc.abstractmethod
     def smallest(self, jacobian: Float[Array, "rows columns"]) -> Scalar:
-        """Smallest singular value of the Jacobian that the structure leaves non-zero."""
+        """Smallest singular value of the Jacobian that is not zero by structure."""
 
 
 class PositionCorrection(AbstractCorrection):
@@ -58,11 +62,13 @@ class PositionCorrection(AbstractCorrection):
 
     axes: tuple[int, ...] = eqx.field(static=True, default=(0, 1, 2))
 
-    def linearised(self, model: ElasticRobot, q, eta, target):
+    def linearised(
+        self, model: ElasticRobot, q: Any, eta: Any, target: MovingFrames
+    ) -> tuple[Any, Any]:
         jacobian, frames = _deformed(model, q, eta, self.axes)
         return jacobian[:3], target.tool_position - frames.tool_position
 
-    def spread(self, model: ElasticRobot, correction):
+    def spread(self, model: ElasticRobot, correction: Any) -> Any:
         return _spread(model, correction, self.axes)
 
     def smallest(self, jacobian: Float[Array, "rows columns"]) -> Scalar:
@@ -89,17 +95,17 @@ class PoseCorrection(AbstractCorrection):
         length = self.characteristic_length
         check_values("`characteristic_length` must be positive [m]", length, length > 0)
 
-    def linearised(self, model: ElasticRobot, q, eta, target):
+    def linearised(
+        self, model: ElasticRobot, q: Any, eta: Any, target: MovingFrames
+    ) -> tuple[Any, Any]:
         jacobian, frames = _deformed(model, q, eta, tuple(range(model.axes)))
         relative = product("ab,cb->ac", target.tool_rotation, frames.tool_rotation)
         turn = linear(_half_vee, relative)
         error = concatenate([target.tool_position - frames.tool_position, turn])
         weights = row_weights(self.characteristic_length)
-        return product("ij,i->ij", jacobian, weights), product(
-            "i,i->i", error, weights
-        )
+        return product("ij,i->ij", jacobian, weights), product("i,i->i", error, weights)
 
-    def spread(self, model: ElasticRobot, correction):
+    def spread(self, model: ElasticRobot, correction: Any) -> Any:
         return correction
 
     def smallest(self, jacobian: Float[Array, "rows columns"]) -> Scalar:
@@ -177,5 +183,3 @@ def _half_vee(relative: Float[Array, "3 3"]) -> Float[Array, "3"]:
             relative[1, 0] - relative[0, 1],
         ]
     )
-
-

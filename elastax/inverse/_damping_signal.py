@@ -74,9 +74,9 @@ class FilteredDamping(AbstractDampingSignal):
         self, smallest: Float[Array, " times"], dt: Scalar, order: int
     ) -> Float[Array, "times terms"]:
         smooth = self.filter.apply(smallest[:, None], dt, order)[..., 0].T
-        return jax.vmap(
-            lambda d: compose(self.law, from_derivatives(d)).coefficients
-        )(smooth)
+        return jax.vmap(lambda d: compose(self.law, from_derivatives(d)).coefficients)(
+            smooth
+        )
 
 
 class FrozenDamping(AbstractDampingSignal):

@@ -59,7 +59,7 @@ def torsions_along(
 
     Args:
         drives: the drive trains.
-        loads: torque behind the gears and its rate [N m, N m/s], as series coefficients.
+        loads: torque behind the gears and its rate [N m, N m/s], as coefficients.
         dt: time between samples [s].
     """
 

@@ -4,11 +4,11 @@ Deformations of the structure and torsions of the gears obey the same scalar equ
 
 $d\,\dot x + k(x) = f(t)$,
 
-[Reiner2010] (3.78), (3.79) and, with $x = \varphi_{rel}$ and $f = -\hat\tau_{a,e}$, (3.93a)
-in the relative angle of footnote 18. It is stable and stiff; the text names its eigenvalue
-$-c/d$. Since the derivatives of f are known at every sample, a step needs no evaluation in
-between: with p derivatives of f, the Hermite-Obreschkoff formula of the Pade approximant
-[p/p+1] of the exponential is L-stable and of order 2 p + 1.
+[Reiner2010] (3.78), (3.79) and, with $x = \varphi_{rel}$ and $f = -\hat\tau_{a,e}$,
+(3.93a) in the relative angle of footnote 18. It is stable and stiff; the text names its
+eigenvalue $-c/d$. Since the derivatives of f are known at every sample, a step needs no
+evaluation in between: with p derivatives of f, the Hermite-Obreschkoff formula of the
+Pade approximant [p/p+1] of the exponential is L-stable and of order 2 p + 1.
 """
 
 import math

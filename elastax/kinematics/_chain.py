@@ -95,8 +95,8 @@ class SerialChain(eqx.Module):
 
 def _chain(joints, kinds, base, tool) -> SerialChain:
     kinds = (JointKind.REVOLUTE,) * joints.number() if kinds is None else tuple(kinds)
-    base = jnp.eye(4) if base is None else base
-    tool = jnp.eye(4) if tool is None else tool
+    base = np.eye(4) if base is None else base
+    tool = np.eye(4) if tool is None else tool
     return SerialChain(joints, base, tool, kinds)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._custom_types import PerJoint
-from .._taylor import Series, concatenate, cross, from_derivatives, leading, product
+from .._taylor import concatenate, cross, from_derivatives, leading, product
 from ._chain import MovingFrames, SerialChain, moving_frames
 from ._joints import JointKind
 

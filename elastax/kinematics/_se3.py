@@ -1,7 +1,7 @@
 """Rotations and homogeneous transforms.
 
-A transform `T_a_b` maps coordinates of frame b into frame a; column vectors, chains read
-from left to right (`papers/notation.md`).
+A transform `T_a_b` maps coordinates of frame b into frame a; column vectors, chains
+read from left to right (`papers/notation.md`).
 """
 
 import jax.numpy as jnp
@@ -33,11 +33,12 @@ def rotation_about(axis: Vector3, angle: Scalar) -> Matrix3:
     """
     a = skew(axis)
     angle = jnp.asarray(angle)
-    return jnp.eye(3, dtype=a.dtype) + jnp.sin(angle) * a + (1 - jnp.cos(angle)) * a @ a
+    sine, rest = jnp.sin(angle), 1 - jnp.cos(angle)
+    return jnp.eye(3, dtype=a.dtype) + sine * a + rest * a @ a
 
 
 def rotation_from_rpy(rpy: Vector3) -> Matrix3:
-    r"""Rotation $R_z(\Theta_z) R_y(\Theta_y) R_x(\Theta_x)$ from (x, y, z) angles [rad].
+    r"""Rotation $R_z(\Theta_z) R_y(\Theta_y) R_x(\Theta_x)$ from angles [rad].
 
     References:
         [KinModell] (3-11).
@@ -73,9 +74,9 @@ def inverse_transform(pose: Transform) -> Transform:
 def rotation_error(target: Matrix3, actual: Matrix3) -> Vector3:
     r"""Small-angle error vector in the base frame, target against actual orientation.
 
-    $e = \tfrac12\,\mathrm{vee}(R_t R_a^T - R_a R_t^T)$, equal to the rotation vector for
-    small errors at any absolute orientation; the difference of $R - R^T$ that the text
-    uses is singular where the absolute rotation angle is 90 or 180 degrees.
+    $e = \tfrac12\,\mathrm{vee}(R_t R_a^T - R_a R_t^T)$, equal to the rotation vector
+    for small errors at any absolute orientation; the difference of $R - R^T$ that the
+    text uses is singular where the absolute rotation angle is 90 or 180 degrees.
 
     References:
         [Reiner2010] (3.55) to (3.57), with the relative error of the errata.

@@ -3,8 +3,7 @@
 import numpy as np
 
 from ..dynamics import Body, ElasticJoint, EndSlope, Part, WristCentre, dh_link
-from ..structure import Material, UniformBeam
-from ..structure import BeamSection
+from ..structure import BeamSection, Material, UniformBeam
 
 
 def arm_parts(
@@ -20,9 +19,9 @@ def arm_parts(
     """Six axes with eight elastic coordinates.
 
     Carousel tilt about x and y; link-arm torsion and lateral hinge with end slope; tilt
-    about x and y at axis 3; two bending hinges of the forearm at axis 4 with end slopes.
-    Bending of the link arm in its plane and torsion of the forearm lie in line with the
-    axes 2 and 4 and belong to their gears.
+    about x and y at axis 3; two bending hinges of the forearm at axis 4 with end
+    slopes. Bending of the link arm in its plane and torsion of the forearm lie in line
+    with the axes 2 and 4 and belong to their gears.
 
     Args:
         table: rows theta, d, a, alpha of the Denavit-Hartenberg table, shape (6, 4).
@@ -35,12 +34,14 @@ def arm_parts(
     References:
         [Reiner2010] sections 2.4.1 and 2.4.3.
     """
-    arm = UniformBeam(material, link_arm, abs(float(table[1, 2]))).clamp_stiffness()
+    clamp = lambda section, length: np.asarray(
+        UniformBeam(material, section, abs(float(length))).clamp_stiffness()
+    ).tolist()
+    arm = clamp(link_arm, table[1, 2])
     # the forearm runs along z of its frame: rotate the beam's x, y, z to z, x, y
-    tube = UniformBeam(material, forearm, abs(float(table[3, 1]))).clamp_stiffness()
+    tube = clamp(forearm, table[3, 1])
 
     def hinge(name, axis, stiffness):
-        stiffness = float(stiffness)
         return ElasticJoint(name, axis, stiffness, damping_time * stiffness)
 
     x, y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)

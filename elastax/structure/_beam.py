@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from .._checks import check_fields, check_values
@@ -110,7 +111,6 @@ class BeamSection(eqx.Module):
         References:
             [Bredt1896]; [Timoshenko1970] sec. 116.
         """
-        height, width, wall = as_real(height), as_real(width), as_real(wall)
         check_values(
             "`wall` must be positive and below half of `height` and `width`",
             wall,
@@ -141,7 +141,6 @@ class BeamSection(eqx.Module):
         Raises:
             ValueError: `wall` is not positive or above the radius.
         """
-        diameter, wall = as_real(diameter), as_real(wall)
         check_values(
             "`wall` must be positive and at most half of `diameter`",
             wall,
@@ -216,7 +215,7 @@ class UniformBeam(eqx.Module):
             of the cantilever.
         """
         factor = load.stiffness_factor
-        return self.rigidity() * jnp.asarray([1.0, factor, factor]) / self.length
+        return self.rigidity() * np.array([1.0, factor, factor]) / self.length
 
     def hinge_stiffness(self) -> Float[Array, "3"]:
         r"""Springs of the replacement with five degrees of freedom [N m/rad].
@@ -229,4 +228,4 @@ class UniformBeam(eqx.Module):
         References:
             [Reiner2010] (2.23a), figure 2.10.
         """
-        return self.rigidity() * jnp.asarray([1.0, 2.0, 2.0]) / self.length
+        return self.rigidity() * np.array([1.0, 2.0, 2.0]) / self.length

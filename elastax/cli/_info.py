@@ -1,0 +1,104 @@
+"""`elastax info`: what a robot is made of."""
+
+import jax
+import numpy as np
+
+from ..analysis import locked_frequencies
+from ..dynamics import ElasticRobot
+from ..io import format_table
+from ..robots import named_robot
+from ._arguments import InfoConfig
+from ._progress import Progress
+
+
+def info(config: InfoConfig, progress: Progress) -> int:
+    """Print axes, elastic coordinates, eigenfrequencies, sources and assumptions.
+
+    Raises:
+        ValueError: unknown robot or bad file.
+    """
+    robot = named_robot(config.robot)
+    progress.say("compiling the eigenfrequencies ...")
+    mass = float(np.sum(robot.bodies.mass))
+    load = float(np.sum(robot.payload.mass))
+    print(
+        f"{robot.name}: {robot.axes} axes, {robot.elastic} elastic coordinates, "
+        f"moving mass {mass:.0f} kg, payload {load:g} kg\n"
+    )
+    print(axes_table(robot), end="\n\n")
+    if robot.elastic:
+        print(structure_table(robot), end="\n\n")
+    print("First eigenfrequencies with the motors locked [Hz]")
+    print(frequency_table(robot), end="\n\n")
+    for title, lines in (("Sources", robot.sources), ("Assumed", robot.assumptions)):
+        if lines:
+            print(f"{title}:")
+            print("\n".join(f"  - {line}" for line in lines))
+    return 0
+
+
+def axes_table(robot: ElasticRobot) -> str:
+    """Limits and drive trains of the axes."""
+    drives, limits = robot.drives, robot.limits
+    stiffness = np.full(robot.axes, np.inf)
+    if drives.stiffness is not None:
+        stiffness = np.asarray(drives.stiffness.stiffness(np.zeros(robot.axes)))
+    rows = [
+        [
+            name,
+            f"{np.rad2deg(float(limits.lower[k])):g} .. "
+            f"{np.rad2deg(float(limits.upper[k])):g}",
+            f"{np.rad2deg(float(limits.velocity[k])):.0f}",
+            f"{float(drives.ratio[k]):.2f}",
+            f"{float(drives.reflected_inertia()[k]):.1f}",
+            f"{stiffness[k]:.3g}",
+            f"{float(drives.damping[k]):.3g}",
+        ]
+        for k, name in enumerate(robot.axis_names)
+    ]
+    return format_table(
+        rows,
+        [
+            "axis",
+            "limits [deg]",
+            "speed [deg/s]",
+            "gear ratio",
+            "rotor [kg m^2]",
+            "gear [N m/rad]",
+            "damper [N m s/rad]",
+        ],
+    )
+
+
+def structure_table(robot: ElasticRobot) -> str:
+    """Springs and dampers of the elastic coordinates."""
+    assert robot.structure_stiffness is not None
+    stiffness = np.asarray(
+        robot.structure_stiffness.stiffness(np.zeros(robot.elastic))
+    )
+    rows = [
+        [name, f"{stiffness[k]:.3g}", f"{float(robot.structure_damping[k]):.3g}"]
+        for k, name in enumerate(robot.elastic_names)
+    ]
+    return format_table(
+        rows, ["elastic coordinate", "spring [N m/rad]", "damper [N m s/rad]"]
+    )
+
+
+def frequency_table(robot: ElasticRobot) -> str:
+    """First three frequencies at the named poses, with and without elastic structure."""
+    names = list(robot.poses)
+    poses = np.stack([np.asarray(robot.poses[name]) for name in names])
+    variants = {"elastic structure": robot}
+    if robot.elastic:
+        variants["rigid structure"] = robot.flexible_joint()
+    program = jax.jit(
+        jax.vmap(lambda r, p: locked_frequencies(r, r.from_maker(p)), (None, 0))
+    )
+    found = {label: np.asarray(program(r, poses)) for label, r in variants.items()}
+    rows = [
+        [name, label, *(f"{f:.2f}" for f in frequencies[k][:3])]
+        for k, name in enumerate(names)
+        for label, frequencies in found.items()
+    ]
+    return format_table(rows, ["pose", "model", "f1", "f2", "f3"])

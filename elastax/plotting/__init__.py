@@ -1,0 +1,21 @@
+"""Figures of runs, pose grids, recordings and perturbed models.
+
+Every function takes data and returns a matplotlib `Figure` with its own canvas: no
+window, no global state. Angles come in radians, lengths in metres; the axes say what
+is drawn.
+"""
+
+from ._drives import (
+    plot_deformations as plot_deformations,
+    plot_torques as plot_torques,
+)
+from ._grid import plot_pose_grid as plot_pose_grid
+from ._paths import (
+    plot_cartesian_path as plot_cartesian_path,
+    plot_path_error as plot_path_error,
+    plot_tool_deviation as plot_tool_deviation,
+    plot_wrist_acceleration as plot_wrist_acceleration,
+)
+from ._perturbations import plot_perturbations as plot_perturbations
+from ._recording import plot_recording as plot_recording
+from ._style import save_figure as save_figure
