@@ -94,9 +94,7 @@ def pendulum(*, mass, length, inertia, drives, gravity=(0.0, -9.81, 0.0)):
     """One axis about z; the angle counts from the horizontal x axis."""
     body = Body("bob", mass, (length, 0.0, 0.0), inertia * np.eye(3))
     parts = [Axis("A1"), body, Offset((length, 0.0, 0.0))]
-    return assembled(
-        "pendulum", parts, drives, gravity=gravity, counterbalanced_axis=0
-    )
+    return assembled("pendulum", parts, drives, gravity=gravity, counterbalanced_axis=0)
 
 
 def two_mass_oscillator(
@@ -279,8 +277,9 @@ def random_state(robot: ElasticRobot, seed: int, count: int, scale: float = 0.5)
     return tuple(jnp.asarray(scale * rng.standard_normal((count, s))) for s in sizes)
 
 
-# 9th degree: the first four derivatives vanish at both ends
-_STEP = np.polynomial.Polynomial([0, 0, 0, 0, 0, 126, -420, 540, -315, 70])
+# 13th degree: the first six derivatives vanish at both ends
+_STEP = (np.polynomial.Polynomial([0.0, 1.0, -1.0]) ** 6).integ()
+_STEP = _STEP / _STEP(1.0)
 
 
 def smooth_motion(start, change, duration: float, t, order: int) -> np.ndarray:

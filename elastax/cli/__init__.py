@@ -1,6 +1,7 @@
 """The command line: `elastax feedforward`, `elastax info`.
 
-Exit status 0: done, 1: a gate failed, 2: bad input, with one line that says what to change.
+Exit status 0: done, 1: a gate failed, 2: bad input, with one line that says what to
+change.
 """
 
 import sys

@@ -93,11 +93,13 @@ def _add_feedforward(commands) -> None:
     default = FeedforwardConfig()
     parser = commands.add_parser(
         "feedforward",
-        help="compare rigid, flexible-joint and elastic (ASIM) feed-forward on a motion",
+        help="compare rigid, flexible-joint and elastic (ASIM) feed-forward on a "
+        "motion",
         description="Rigid, flexible-joint (RLFJ) and structurally elastic (ASIM) "
-        "feed-forward of the same motion, each simulated on the full elastic robot under "
-        "the same motor control. Without options: kr210 with 210 kg, 5 degrees on three "
-        "axes from the stretched pose.",
+        "feed-forward of the same motion, each simulated on the full elastic robot "
+        "under "
+        "the same motor control. Without options: kr210 with 210 kg, 5 degrees on "
+        "three axes from the stretched pose.",
         allow_abbrev=False,
     )
     add = parser.add_argument
@@ -120,16 +122,16 @@ def _add_feedforward(commands) -> None:
     add(
         "--path",
         metavar="rectangle|FILE.csv",
-        help="straight Cartesian path instead of a move: the rectangle of figure 6.5, or "
-        "way-points x, y, z [m] in the base frame; orientation stays",
+        help="straight Cartesian path instead of a move: the rectangle of figure 6.5, "
+        "or way-points x, y, z [m] in the base frame; orientation stays",
     )
     add(
         "--payload",
         nargs="+",
         type=float,
         metavar="NUMBER",
-        help="mass [kg], centre of mass x y z [m] in the flange frame, moments of inertia "
-        "xx yy zz about it [kg m^2]; 0 takes the payload off",
+        help="mass [kg], centre of mass x y z [m] in the flange frame, moments of "
+        "inertia xx yy zz about it [kg m^2]; 0 takes the payload off",
     )
     add(
         "--inverse",
@@ -166,7 +168,12 @@ def _add_feedforward(commands) -> None:
         help="the table again with the model's stiffness, damping, payload off by plus "
         "and minus this fraction",
     )
-    add("--cutoff", type=float, default=default.cutoff, help="of the reference filter [Hz]")
+    add(
+        "--cutoff",
+        type=float,
+        default=default.cutoff,
+        help="of the reference filter [Hz]",
+    )
     add("--filter-order", type=int, default=default.filter_order, help="of that filter")
     add(
         "--stream",

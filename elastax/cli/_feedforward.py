@@ -12,7 +12,7 @@ import numpy as np
 from ..control import CascadeMotorControl, Run, run_command
 from ..dynamics import CommandInterpolant, ElasticRobot, MotorCommand
 from ..inverse import ASIM, AbstractInverse, FlexibleJointInverse, RigidInverse
-from ..io import check_schema, versions, write_results
+from ..io import versions, write_results
 from ..robots import named_robot
 from ..signals import Reference
 from ._arguments import FeedforwardConfig
@@ -66,6 +66,8 @@ def feedforward(config: FeedforwardConfig, progress: Progress) -> int:
     _check(config)
     result = {"schema": SCHEMA, "robot": robot.name, "versions": versions()}
     result["configuration"] = dataclasses.asdict(config)
+    result["sources"] = list(robot.sources)
+    result["assumptions"] = list(robot.assumptions)
     arrays: dict[str, np.ndarray] = {}
     if config.recording is not None:
         report, motion = run_recording(robot, config, progress)
@@ -85,7 +87,7 @@ def feedforward(config: FeedforwardConfig, progress: Progress) -> int:
         for name in config.inverses:
             cost[name].update(stream_cost(name, robot, motion.reference, progress))
     result["inverses"] = {n: summary(r) | cost[n] for n, r in runs.items()}
-    print(runs_table(robot, runs, cost))
+    print(runs_table(robot, result))
     perturbed = grid = None
     if config.perturb is not None:
         perturbed = run_perturbed(
@@ -100,7 +102,9 @@ def feedforward(config: FeedforwardConfig, progress: Progress) -> int:
     if report is not None:
         print(recording_table(report.summary))
     result |= {"wall_s": progress.elapsed(), "compile_s": programs.seconds}
-    write(config, robot, motion, runs, perturbed, grid, report, result, arrays, progress)
+    write(
+        config, robot, motion, runs, perturbed, grid, report, result, arrays, progress
+    )
     return 0 if _finite(result["inverses"]) else 1
 
 
@@ -131,8 +135,9 @@ def with_payload(robot: ElasticRobot, numbers: tuple[float, ...] | None):
         return robot.with_payload(0.0, np.zeros(3), np.zeros((3, 3)))
     if len(numbers) != 7:
         raise ValueError(
-            "--payload must give 7 numbers, the mass [kg], the centre of mass x y z [m] "
-            "in the flange frame and the moments of inertia xx yy zz about it [kg m^2], "
+            "--payload must give 7 numbers, the mass [kg], the centre of mass x y z "
+            "[m] in the flange frame and the moments of inertia xx yy zz about it [kg "
+            "m^2], "
             f"or a single 0 for none, but there are {len(numbers)}: a payload without "
             "inertia makes the model singular"
         )
@@ -255,24 +260,17 @@ def write(
             arrays[f"{name}_{field}"] = np.asarray(getattr(run.simulation, field))
         arrays[f"{name}_tool_position"] = np.asarray(run.simulation.tool_pose[:, :3, 3])
         arrays[f"{name}_path_error"] = np.asarray(run.judgement.path_error)
-    files = {}
+    commands = {}
     if config.rate is not None:
-        files = {
+        commands = {
             f"commands_{name}.csv": command_csv(robot, run.command, config.rate)
             for name, run in runs.items()
         }
-    check_schema(result)
     drawn = figures(robot, motion, runs, perturbed, grid, report)
     folder = pathlib.Path(config.out)
-    write_results(
-        folder,
-        result,
-        arrays,
-        drawn,
-        files=files,
-        sources=robot.sources,
-        assumptions=robot.assumptions,
-    )
+    write_results(folder, result, arrays, drawn)
+    for name, text in commands.items():
+        (folder / name).write_text(text, encoding="utf-8")
     progress.say(f"results in {folder}")
     print(f"report: {folder / 'report.html'}")
 

@@ -34,16 +34,17 @@ def figures(
         (
             "path_error",
             "Path error",
-            "Distance of the tool from where the rigid robot's tool would be on the same "
-            "filtered reference. The dashed lines mark the end of the motion and of the "
-            "criterion's window.",
+            "Distance of the tool from where the rigid robot's tool would be on the "
+            "same "
+            "filtered reference. The dashed lines mark the end of the motion and of "
+            "the criterion's window.",
             plot_path_error(runs),
         ),
         (
             "wrist_acceleration",
             "Acceleration after the stop",
-            "Acceleration of the wrist centre in the base frame; criterion C integrates "
-            "it over the shaded window.",
+            "Acceleration of the wrist centre in the base frame; criterion C "
+            "integrates it over the shaded window.",
             plot_wrist_acceleration(runs),
         ),
         (
@@ -58,7 +59,8 @@ def figures(
             (
                 "cartesian_path",
                 "Cartesian path",
-                "The tool's path with magnified deviations, the sag at rest subtracted.",
+                "The tool's path with magnified deviations, the sag at rest "
+                "subtracted.",
                 plot_cartesian_path(runs, path),
             )
         )
@@ -97,9 +99,10 @@ def figures(
             (
                 "pose_grid",
                 "Pose grid",
-                "Criterion C over the start angles of A2 and A3 and the ratio of ASIM to "
-                "the flexible-joint feed-forward, as in figures 6.6 and 6.7. A sign of a "
-                "move is reversed where a limit forbids it.",
+                "Criterion C over the start angles of A2 and A3 and the ratio of ASIM "
+                "to "
+                "the flexible-joint feed-forward, as in figures 6.6 and 6.7. A sign of "
+                "a move is reversed where a limit forbids it.",
                 plot_pose_grid(np.deg2rad(grid.poses), moves, grid.criterion),
             )
         )

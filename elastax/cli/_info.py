@@ -5,10 +5,10 @@ import numpy as np
 
 from ..analysis import locked_frequencies
 from ..dynamics import ElasticRobot
-from ..io import format_table
 from ..robots import named_robot
 from ._arguments import InfoConfig
 from ._progress import Progress
+from ._tables import table
 
 
 def info(config: InfoConfig, progress: Progress) -> int:
@@ -56,7 +56,7 @@ def axes_table(robot: ElasticRobot) -> str:
         ]
         for k, name in enumerate(robot.axis_names)
     ]
-    return format_table(
+    return table(
         rows,
         [
             "axis",
@@ -73,20 +73,16 @@ def axes_table(robot: ElasticRobot) -> str:
 def structure_table(robot: ElasticRobot) -> str:
     """Springs and dampers of the elastic coordinates."""
     assert robot.structure_stiffness is not None
-    stiffness = np.asarray(
-        robot.structure_stiffness.stiffness(np.zeros(robot.elastic))
-    )
+    stiffness = np.asarray(robot.structure_stiffness.stiffness(np.zeros(robot.elastic)))
     rows = [
         [name, f"{stiffness[k]:.3g}", f"{float(robot.structure_damping[k]):.3g}"]
         for k, name in enumerate(robot.elastic_names)
     ]
-    return format_table(
-        rows, ["elastic coordinate", "spring [N m/rad]", "damper [N m s/rad]"]
-    )
+    return table(rows, ["elastic coordinate", "spring [N m/rad]", "damper [N m s/rad]"])
 
 
 def frequency_table(robot: ElasticRobot) -> str:
-    """First three frequencies at the named poses, with and without elastic structure."""
+    """First three frequencies at the named poses, with elastic and rigid structure."""
     names = list(robot.poses)
     poses = np.stack([np.asarray(robot.poses[name]) for name in names])
     variants = {"elastic structure": robot}
@@ -101,4 +97,4 @@ def frequency_table(robot: ElasticRobot) -> str:
         for k, name in enumerate(names)
         for label, frequencies in found.items()
     ]
-    return format_table(rows, ["pose", "model", "f1", "f2", "f3"])
+    return table(rows, ["pose", "model", "f1", "f2", "f3"])

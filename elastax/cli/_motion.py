@@ -57,8 +57,8 @@ def reference_filter(config: FeedforwardConfig) -> BesselFilter:
     """
     if config.filter_order < ORDER:
         raise ValueError(
-            f"the filter order must be at least {ORDER}, for as many derivatives of the "
-            f"reference, but is {config.filter_order}: give --filter-order 6"
+            f"the filter order must be at least {ORDER}, for as many derivatives of "
+            f"the reference, but is {config.filter_order}: give --filter-order 6"
         )
     return BesselFilter(config.filter_order, config.cutoff)
 
@@ -113,8 +113,8 @@ def allowed_move(
         end, back = start[k] + move[k], start[k] - move[k]
         if not lower[k] <= end <= upper[k] and lower[k] <= back <= upper[k]:
             notes.append(
-                f"{name} moves by {-move[k]:g} instead of {move[k]:g} deg: a limit forbids "
-                f"{end:g} deg"
+                f"{name} moves by {-move[k]:g} instead of {move[k]:g} deg: a limit "
+                f"forbids {end:g} deg"
             )
             move[k] = -move[k]
     return move, notes
@@ -208,8 +208,8 @@ def _path_motion(robot, config, filter, start) -> Motion:
         k = int(np.argmin(np.asarray(valid)))
         where = ", ".join(f"{x:.3f}" for x in np.asarray(points)[k])
         raise ValueError(
-            f"the path is out of reach {times[k]:.3f} s after its start, at ({where}) m: "
-            "move the way-points closer or choose another pose"
+            f"the path is out of reach {times[k]:.3f} s after its start, at ({where}) "
+            "m: move the way-points closer or choose another pose"
         )
     maker = np.rad2deg(np.asarray(jax.vmap(robot.to_maker)(joints)))
     check_limits(robot, maker.min(axis=0), "the path")

@@ -10,9 +10,7 @@ from ..signals import Reference
 from ._progress import Progress
 
 
-def perturbed_models(
-    robot: ElasticRobot, fraction: float
-) -> dict[str, ElasticRobot]:
+def perturbed_models(robot: ElasticRobot, fraction: float) -> dict[str, ElasticRobot]:
     """Models whose stiffness, damping or payload is off by plus or minus `fraction`."""
     models = {}
     for sign in (1, -1):

@@ -9,8 +9,8 @@ import jax
 def configure() -> None:
     """Switch on double precision and the persistent compilation cache.
 
-    The cache lies in `ELASTAX_CACHE`, else in `~/.cache/elastax`; `JAX_COMPILATION_CACHE_DIR`
-    goes before both.
+    The cache lies in `ELASTAX_CACHE`, else in `~/.cache/elastax`;
+    `JAX_COMPILATION_CACHE_DIR` goes before both.
     """
     jax.config.update("jax_enable_x64", True)
     if "JAX_COMPILATION_CACHE_DIR" in os.environ:

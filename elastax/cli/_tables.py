@@ -2,63 +2,41 @@
 
 import numpy as np
 
-from ..control import Run
 from ..dynamics import ElasticRobot
-from ..io import format_table
+from ..io import FEEDFORWARD_COLUMNS, Column, feedforward_rows, format_table
 from ._grid import MOVES, Grid
 
 
 LABELS = {"rigid": "rigid", "flexible_joint": "flexible joint", "asim": "ASIM"}
 
 
-def runs_table(robot: ElasticRobot, runs: dict[str, Run], cost: dict) -> str:
+def table(rows: list[list[str]], titles: list[str]) -> str:
+    """Aligned table of ready texts under titles."""
+    columns = [Column(title, title) for title in titles]
+    return format_table([dict(zip(titles, row)) for row in rows], columns)
+
+
+def runs_table(robot: ElasticRobot, result: dict) -> str:
     """Figures of every feed-forward, as in table 6.1 and with the criterion."""
+    inverses = result["inverses"]
+    lines = [format_table(feedforward_rows(result), FEEDFORWARD_COLUMNS)]
+    if {"asim", "flexible_joint"} <= inverses.keys():
+        asim, other = inverses["asim"], inverses["flexible_joint"]
+        pairs = {"largest error": "path_error_max", "C": "criterion"}
+        ratios = [f"{label} {asim[f] / other[f]:.3f}" for label, f in pairs.items()]
+        lines.append("ASIM over flexible joint (RLFJ): " + ", ".join(ratios))
     shown = min(3, robot.axes)
-    columns = [
-        "feed-forward",
-        "path error [mm s]",
-        "less offset [mm s]",
-        "largest [mm]",
-        "C [m/s]",
-        "settling [s]",
-        f"motor torque {' '.join(robot.axis_names[:shown])} [N m]",
-        "us/sample",
-    ]
-    rows = []
-    for name, run in runs.items():
-        j = run.judgement
-        rows.append(
-            [
-                LABELS[name],
-                f"{1e3 * float(j.path_error_integral):.3f}",
-                f"{1e3 * float(j.path_error_integral_relative):.3f}",
-                f"{1e3 * float(j.path_error_max):.3f}",
-                f"{float(j.criterion):.4f}",
-                f"{float(j.settling_time):.3f}",
-                " ".join(f"{float(t):.1f}" for t in j.peak_motor_torque[:shown]),
-                f"{1e6 * cost[name]['seconds_per_sample']:.0f}",
-            ]
+    axes = ", ".join(robot.axis_names[:shown])
+    for name, figures in inverses.items():
+        motors = ", ".join(f"{t:.1f}" for t in figures["peak_motor_torque"][:shown])
+        gears = ", ".join(f"{t:.0f}" for t in figures["peak_gear_torque"][:shown])
+        lines.append(
+            f"{LABELS[name]}: peak torque of {axes} at the motors {motors} N m, "
+            f"at the gears {gears} N m"
         )
-    lines = [format_table(rows, columns)]
-    if {"asim", "flexible_joint"} <= runs.keys():
-        asim, other = runs["asim"].judgement, runs["flexible_joint"].judgement
-        fields = {
-            "path error": "path_error_integral",
-            "less offset": "path_error_integral_relative",
-            "largest": "path_error_max",
-            "C": "criterion",
-        }
-        ratios = [
-            f"{label} {float(getattr(asim, f)) / float(getattr(other, f)):.3f}"
-            for label, f in fields.items()
-        ]
-        lines.append("ASIM over flexible joint: " + ", ".join(ratios))
-    for name in runs:
-        if "step_median_s" in cost[name]:
-            median, p99 = (1e6 * cost[name][k] for k in ("step_median_s", "step_p99_s"))
-            lines.append(
-                f"one step of {LABELS[name]}: median {median:.0f} us, p99 {p99:.0f} us"
-            )
+        if "step_median_s" in figures:
+            median, p99 = (1e6 * figures[k] for k in ("step_median_s", "step_p99_s"))
+            lines.append(f"  streamed: median {median:.0f} us a step, p99 {p99:.0f} us")
     return "\n".join(lines)
 
 
@@ -89,7 +67,7 @@ def perturbation_table(perturbed: dict) -> str:
     columns += [f"{LABELS[name]} [mm s]" for name in names]
     columns += [f"C {LABELS[name]} [m/s]" for name in names]
     columns += ["ASIM / fl. joint"] if both else []
-    return format_table(rows, columns)
+    return table(rows, columns)
 
 
 def grid_lines(grid: Grid) -> list[str]:
@@ -132,7 +110,7 @@ def recording_table(summary: dict) -> str:
                 _number(windup["rms"], k, 1e3, 4),
             ]
         )
-    return format_table(
+    return table(
         rows,
         [
             "axis",

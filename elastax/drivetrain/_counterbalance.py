@@ -22,7 +22,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._checks import check_fields, check_values
+from .._checks import check_fields, check_values, is_concrete
 from .._custom_types import Scalar, as_real
 
 
@@ -203,7 +203,7 @@ class GasCounterbalance(AbstractCounterbalance):
             does: the full piston would give 220 bar at -40 deg, the rod 176 bar. Moving
             the dead point and the filling gains little (1.4 bar rms).
         """
-        energy = as_real(compressibility * gas_constant * temperature * mass)
+        energy = compressibility * gas_constant * temperature * mass
         return cls(pressure=energy / volume, volume=volume, **geometry)
 
     def area(self) -> Scalar:
@@ -240,13 +240,14 @@ def _check_geometry(cylinder) -> None:
     check_values(
         "`damping` must not be negative", cylinder.damping, cylinder.damping >= 0
     )
-    gap = jnp.abs(cylinder.lever - cylinder.base_distance)
-    check_values(
-        "`lever` must differ from `base_distance`, or the length vanishes at the dead "
-        "point",
-        cylinder.lever,
-        gap > 1e-6 * cylinder.base_distance,
-    )
+    if is_concrete(cylinder.lever, cylinder.base_distance):
+        lever, distance = float(cylinder.lever), float(cylinder.base_distance)
+        check_values(
+            "`lever` must differ from `base_distance`, or the length vanishes at the "
+            "dead point",
+            lever,
+            abs(lever - distance) > 1e-6 * distance,
+        )
 
 
 def _length(cylinder, angle):

@@ -16,7 +16,8 @@ def static_equilibrium(
 ) -> tuple[PerJoint, PerElastic]:
     """Joint angles and deformations at which the robot rests on locked motors.
 
-    Newton's method from the undeformed robot, with a fixed number of steps.
+    Newton's method from the undeformed robot, with a fixed number of steps; it is
+    differentiated implicitly.
 
     Args:
         robot: the robot, with elastic gears.
@@ -38,12 +39,18 @@ def static_equilibrium(
             joint = q - theta
         return jnp.concatenate([joint, structure])
 
-    def newton(x, _):
-        slope = jax.jacfwd(residual)(x)
-        return x - jnp.linalg.solve(slope, residual(x)), None
+    def newton(function, start):
+        def step(x, _):
+            slope = jax.jacfwd(function)(x)
+            return x - jnp.linalg.solve(slope, function(x)), None
+
+        return jax.lax.scan(step, start, None, length=_STEPS)[0]
+
+    def solve_linear(function, right):
+        return jnp.linalg.solve(jax.jacfwd(function)(right), right)
 
     start = jnp.concatenate([theta, rest])
-    x, _ = jax.lax.scan(newton, start, None, length=_STEPS)
+    x = jax.lax.custom_root(residual, start, newton, solve_linear)
     return x[:n], x[n:]
 
 

@@ -31,6 +31,7 @@ from ._damping_signal import AbstractDampingSignal, FilteredDamping
 from ._drive import (
     DriveState,
     advance_torsion,
+    gear_spring,
     motor_motion,
     resting_torsion,
     torsions_along,
@@ -77,7 +78,9 @@ class ASIM(AbstractInverse):
     def order(self) -> int:
         return 4
 
-    def init(self, model: ElasticRobot, sample: Derivatives, dt: Scalar) -> _State:
+    def init(
+        self, model: ElasticRobot, sample: Derivatives, dt: Scalar | float
+    ) -> _State:
         forcing = structure_torque(model, sample)
         eta = resting_deformation(model, forcing)
         dt = jnp.asarray(dt, sample.dtype)
@@ -114,6 +117,7 @@ class ASIM(AbstractInverse):
 
     def feedforward(self, model: ElasticRobot, reference: Reference) -> MotorCommand:
         check_reference(self, model, reference)
+        gear_spring(model.drives)
         samples, dt = samples_of(self, reference), reference.dt
         forcing = jax.vmap(lambda s: structure_torque(model, s).coefficients)(samples)
         eta = deformations_along(model, forcing, dt)

@@ -24,7 +24,7 @@ class AbstractInverse(eqx.Module):
         """Highest derivative of the reference that the inverse uses."""
 
     @abc.abstractmethod
-    def init(self, model: ElasticRobot, sample: Derivatives, dt: Scalar) -> Any:
+    def init(self, model: ElasticRobot, sample: Derivatives, dt: Scalar | float) -> Any:
         """State at rest in the first sample.
 
         Args:

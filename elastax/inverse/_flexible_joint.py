@@ -12,6 +12,7 @@ from ._base import AbstractInverse, Derivatives, check_reference, samples_of
 from ._drive import (
     DriveState,
     advance_torsion,
+    gear_spring,
     motor_motion,
     resting_torsion,
     torsions_along,
@@ -34,7 +35,9 @@ class FlexibleJointInverse(AbstractInverse):
     def order(self) -> int:
         return 3
 
-    def init(self, model: ElasticRobot, sample: Derivatives, dt: Scalar) -> _State:
+    def init(
+        self, model: ElasticRobot, sample: Derivatives, dt: Scalar | float
+    ) -> _State:
         load = _load(model.flexible_joint(), sample)
         torsion = resting_torsion(model.drives, load)
         dt = jnp.asarray(dt, sample.dtype)
@@ -54,6 +57,7 @@ class FlexibleJointInverse(AbstractInverse):
 
     def feedforward(self, model: ElasticRobot, reference: Reference) -> MotorCommand:
         check_reference(self, model, reference)
+        gear_spring(model.drives)
         samples = samples_of(self, reference)
         rigid_links = model.flexible_joint()
         loads = jax.vmap(lambda s: _load(rigid_links, s).coefficients)(samples)

@@ -55,7 +55,7 @@ def advance(
     x: Channels,
     before: Series,
     after: Series,
-    dt: Scalar,
+    dt: Scalar | float,
 ) -> Channels:
     """The response one sample later.
 
@@ -101,7 +101,7 @@ def _pade(numerator: int, denominator: int) -> tuple[list[float], list[float]]:
     return coefficients(numerator), coefficients(denominator)
 
 
-def _combine(weights: list[float], series: Series, dt: Scalar) -> Channels:
+def _combine(weights: list[float], series: Series, dt: Scalar | float) -> Channels:
     derivatives = series.derivatives()
     return sum(
         (w * dt**i * derivatives[i] for i, w in enumerate(weights) if i > 0),

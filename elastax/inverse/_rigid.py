@@ -21,7 +21,9 @@ class RigidInverse(AbstractInverse):
     def order(self) -> int:
         return 2
 
-    def init(self, model: ElasticRobot, sample: Derivatives, dt: Scalar) -> None:
+    def init(
+        self, model: ElasticRobot, sample: Derivatives, dt: Scalar | float
+    ) -> None:
         return None
 
     def step(

@@ -1,3 +1,16 @@
 """Files: robots, recordings, results."""
 
+from ._recording import load_recording as load_recording
+from ._report import (
+    FEEDFORWARD_COLUMNS as FEEDFORWARD_COLUMNS,
+    Column as Column,
+    feedforward_rows as feedforward_rows,
+    format_table as format_table,
+)
+from ._results import (
+    check_schema as check_schema,
+    read_result as read_result,
+    versions as versions,
+    write_results as write_results,
+)
 from ._robot_file import load_robot as load_robot, robot_from_table as robot_from_table

@@ -153,7 +153,7 @@ class DHJoints(AbstractJoints):
 
 
 def _identities(number: int, dtype) -> Float[Array, "joints 4 4"]:
-    return jnp.broadcast_to(jnp.eye(4, dtype=dtype), (number, 4, 4))
+    return jax.device_put(np.tile(np.eye(4, dtype=dtype), (number, 1, 1)))
 
 
 def _check_axes(axis) -> None:

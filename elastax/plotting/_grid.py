@@ -98,17 +98,21 @@ def _draw_ratios(figure: Figure, panels, points, ratios) -> None:
             continue
         for point, value in zip(points, ratio):
             if np.isfinite(value):
-                _number(panel, point, f"{value:.2f}")
+                _number(panel, point, f"{value:.2f}", points)
 
 
-def _number(panel: Axes, point, text: str) -> None:
+def _number(panel: Axes, point, text: str, points) -> None:
+    """Number beside a circle, on the side that lies inside the panel."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    left, right = np.isclose(point[0], low[0]), np.isclose(point[0], high[0])
+    below = np.isclose(point[1], high[1])
     panel.annotate(
         text,
         point,
-        (0, 5),
+        (5 * (int(left) - int(right)), -5 if below else 5),
         textcoords="offset points",
-        ha="center",
-        va="bottom",
+        ha="left" if left else "right" if right else "center",
+        va="top" if below else "bottom",
         fontsize=7,
         color=INK,
         bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.6},

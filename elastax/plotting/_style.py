@@ -35,6 +35,7 @@ def new_figure(title, rows, columns, height, width=WIDTH, **options):
     ratios = options.pop("width_ratios", None)
     figure = Figure((width, height), dpi=DPI, layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
+    figure.get_layout_engine().set(w_pad=0.08, h_pad=0.05)
     figure.suptitle(
         title, fontsize=11.5, fontweight="bold", x=0.01, ha="left", color=INK
     )

@@ -26,8 +26,8 @@ def kr300() -> ElasticRobot:
     centre of mass at 0.1 m). Structure estimated from assumed sections, as for `kr210`.
 
     The joint angles are KUKA's, and the base turns the table's z down: A1 turns about
-    -z, zero is the stretched arm, positive A2 and A3 lower the arm. The recordings start
-    in the pose "cannon".
+    -z, zero is the stretched arm, positive A2 and A3 lower the arm. The recordings
+    start in the pose "cannon".
 
     The friction of the source changes its sign within 1e-4 rad/s. That is harmless in a
     feed-forward, but makes a simulation stiff.
@@ -129,15 +129,15 @@ def kr300() -> ElasticRobot:
         counterbalance=quantec.counterbalance(),
         tool=tool,
         sources=(
-            "kinematics, bodies, motors, gears of axes 1 to 3, friction, counterbalance, "
-            "ranges of the axes: KR300 R2500 ultra [Weigand2021]",
-            "mass and centre of mass of the load: from the terms stored in its recordings",
+            "kinematics, bodies, motors, gears of axes 1 to 3, friction, "
+            "counterbalance, ranges of the axes: KR300 R2500 ultra [Weigand2021]",
+            "mass and centre of mass of the load: from terms stored in the recordings",
         ),
         assumptions=(
             *quantec.ASSUMPTIONS,
-            "payload: the recordings' 150 kg of link 6 less the flange's 17.78 kg, first "
-            "moments kept; its inertia is that of a steel disc of 0.4 m diameter. The "
-            "tensor stored for link 6 is kept as the flange's: it is too small for both",
+            "payload: the recordings' 150 kg of link 6 less the flange's 17.78 kg, "
+            "first moments kept; its inertia is that of a steel disc of 0.4 m diameter. "
+            "The tensor stored for link 6, too small for both, is kept as the flange's",
             "speeds: 4500 rpm at the motors",
             "A2 widened to +20 deg for the stretched pose, the maker's limit is -5 deg",
         ),

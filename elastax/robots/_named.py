@@ -6,11 +6,13 @@ from ..dynamics import ElasticRobot
 from ..io import load_robot
 from ._kr16 import kr16
 from ._kr210 import kr210
+from ._kr300 import kr300
 from ._manutec_r3 import manutec_r3
 
 
 ROBOTS = {
     "kr210": kr210,
+    "kr300": kr300,
     "kr16": kr16,
     "manutec_r3": manutec_r3,
 }

@@ -118,24 +118,24 @@ def test_infinite_stiffness_is_the_rigid_robot():
     )
     assert rigid.axes == 3 and rigid.elastic == 0 and not rigid.has_elastic_gears
 
-    def stiff(torque):
+    def stiff(robot, torque):
         """Accelerations with a gear that transmits `torque` at no torsion."""
         eom = equations_of_motion(robot, q, eta, q, qd, etad, qd)
         qdd = jnp.linalg.solve(eom.M_aa, -eom.h_a - torque)
         return qdd, (tau_m - eom.h_m + torque) / eom.Theta
 
-    def difference(torque):
-        qdd, thetadd = stiff(torque)
-        return qdd - thetadd
+    def both(robot, rigid):
+        def difference(torque):
+            qdd, thetadd = stiff(robot, torque)
+            return qdd - thetadd
 
-    def both():
         zero = jnp.zeros_like(tau_m)
         slope = jax.jacfwd(difference)(zero)
         torque = -jnp.linalg.solve(slope, difference(zero))
-        elastic = stiff(torque)[0]
+        elastic = stiff(robot, torque)[0]
         return elastic, forward_dynamics(rigid, q, eta, q, qd, etad, qd, tau_m)
 
-    elastic, (qdd, _, thetadd) = systems.run(both)
+    elastic, (qdd, _, thetadd) = systems.run(both, robot, rigid)
     assert_close(elastic, qdd, rtol=1e-10)
     assert_close(thetadd, qdd, rtol=0)
 

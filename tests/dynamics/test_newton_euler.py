@@ -21,7 +21,7 @@ from tests import systems
 from tests.helpers import assert_close, assert_gradient, load_vectors
 
 
-SIZES = [(3, 2, False), (2, 7, True), (8, 12, True)]
+SIZES = [(3, 2, False), (8, 12, True)]
 
 
 @pytest.mark.parametrize(("axes", "elastic", "counterbalance"), SIZES)
@@ -61,13 +61,15 @@ def test_rigid_gears_by_two_routes():
     robot = systems.random_robot(5, 3, 2, counterbalance=True).rigid()
     states = systems.random_state(robot, 8, 3)
 
-    def two_routes(state):
+    def two_routes(robot, state):
         q, eta, _, qd, etad, _, qdd, etadd, _ = state
         state = (q, eta, q, qd, etad, qd, qdd, etadd, qdd)
         eom = equations_of_motion(robot, q, eta, q, qd, etad, qd)
         return lagrange_forces(robot, *state)[0], eom.M_aa @ qdd + eom.h_a
 
-    by_energy, by_blocks = systems.run(jax.vmap(two_routes), states)
+    by_energy, by_blocks = systems.run(
+        jax.vmap(two_routes, in_axes=(None, 0)), robot, states
+    )
     assert_close(by_blocks, by_energy, rtol=0, atol=1e-10 * np.abs(by_energy).max())
 
 
@@ -82,7 +84,7 @@ def test_planar_arm_of_the_vectors():
         gravity=given["g"],
     )
     motion = (jnp.array(given[k]) for k in ("q", "dq", "ddq"))
-    tau, _ = systems.run(functools.partial(inverse_dynamics, robot), *motion)
+    tau, _ = systems.run(inverse_dynamics, robot, *motion)
     assert_close(tau, vector["outputs"]["tau"], rtol=vector["tol"])
 
 
@@ -104,9 +106,9 @@ def test_series_against_nested_jvp():
     # coordinates (q, eta) as polynomials in time
     rows = jnp.asarray(np.random.default_rng(2).standard_normal((5, 4)))
 
-    def forces(t):
-        x = lambda t: rows[0] + t * (
-            rows[1] + t * (rows[2] + t * (rows[3] + t * rows[4]))
+    def forces(robot, t):
+        x = lambda t: (
+            rows[0] + t * (rows[1] + t * (rows[2] + t * (rows[3] + t * rows[4])))
         )
         rate = lambda f: lambda t: jax.jvp(f, (t,), (jnp.ones_like(t),))[1]
         s, sd, sdd = x(t), rate(x)(t), rate(rate(x))(t)
@@ -114,12 +116,12 @@ def test_series_against_nested_jvp():
             inverse_dynamics(robot, s[:2], sd[:2], sdd[:2], s[2:], sd[2:], sdd[2:])
         )
 
-    def nested(t):
-        first = lambda t: jax.jvp(forces, (t,), (jnp.ones_like(t),))[1]
-        value, second = jax.jvp(first, (t,), (jnp.ones_like(t),))
-        return jnp.stack([forces(t), value, second])
+    def nested(robot, t):
+        value = lambda t: forces(robot, t)
+        first = lambda t: jax.jvp(value, (t,), (jnp.ones_like(t),))[1]
+        return jnp.stack([value(t), *jax.jvp(first, (t,), (jnp.ones_like(t),))])
 
-    def series():
+    def series(robot):
         factorials = jnp.array([1.0, 1.0, 2.0, 6.0, 24.0])
         s = from_derivatives(rows * factorials[:, None])
         sd, sdd = s.rate(), s.rate().rate()
@@ -130,9 +132,11 @@ def test_series_against_nested_jvp():
         parts = [joint.derivatives(), structure.derivatives()]
         return jnp.concatenate(parts, axis=1)
 
-    desired = systems.run(nested, jnp.zeros(()))
+    desired = systems.run(nested, robot, jnp.zeros(()))
     scale = np.abs(desired).max(axis=1, keepdims=True)
-    assert_close(systems.run(series) / scale, desired / scale, rtol=0, atol=1e-12)
+    assert_close(
+        systems.run(series, robot) / scale, desired / scale, rtol=0, atol=1e-12
+    )
 
 
 def test_gradient():
@@ -148,9 +152,10 @@ def test_speeds_near_zero_and_large():
     one = jnp.ones((2,))
 
     @jax.jit
-    def tau(q, qd):
+    def torque(robot, q, qd):
         return jnp.concatenate(inverse_dynamics(robot, q, qd, 0.0 * one))
 
+    tau = functools.partial(torque, robot)
     rest = tau(0.3 * one, 0.0 * one)
     assert_close(tau(0.3 * one, 1e-300 * one), rest, rtol=1e-15)
     assert np.all(np.isfinite(tau(0.3 * one, 1e8 * one)))

@@ -1,0 +1,15 @@
+"""Identification: recordings, encoder skew, friction, figures of merit."""
+
+from ._evaluate import (
+    RecordingReport as RecordingReport,
+    evaluate_recording as evaluate_recording,
+)
+from ._recording import Recording as Recording, recorded_reference as recorded_reference
+from ._recording_fit import (
+    STEEPNESS_GRID as STEEPNESS_GRID,
+    FrictionFit as FrictionFit,
+    coefficient_of_determination as coefficient_of_determination,
+    fit_friction as fit_friction,
+    predict_torque as predict_torque,
+)
+from ._skew import EncoderSkew as EncoderSkew, estimate_skew as estimate_skew
