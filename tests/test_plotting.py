@@ -258,6 +258,8 @@ def test_pose_grid_refuses_other_shapes():
     poses, moves, criterion = grid(3)
     with pytest.raises(ValueError, match=r"\(moves, poses\) = \(1, 9\)"):
         plotting.plot_pose_grid(poses, moves[:1], criterion)
+    with pytest.raises(ValueError, match="at least one inverse"):
+        plotting.plot_pose_grid(poses, moves, {})
 
 
 def test_recording():

@@ -1,6 +1,7 @@
 """`elastax info`: what a robot is made of."""
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from ..analysis import locked_frequencies
@@ -42,7 +43,7 @@ def axes_table(robot: ElasticRobot) -> str:
     drives, limits = robot.drives, robot.limits
     stiffness = np.full(robot.axes, np.inf)
     if drives.stiffness is not None:
-        stiffness = np.asarray(drives.stiffness.stiffness(np.zeros(robot.axes)))
+        stiffness = np.asarray(drives.stiffness.stiffness(jnp.zeros(robot.axes)))
     rows = [
         [
             name,
@@ -73,7 +74,9 @@ def axes_table(robot: ElasticRobot) -> str:
 def structure_table(robot: ElasticRobot) -> str:
     """Springs and dampers of the elastic coordinates."""
     assert robot.structure_stiffness is not None
-    stiffness = np.asarray(robot.structure_stiffness.stiffness(np.zeros(robot.elastic)))
+    stiffness = np.asarray(
+        robot.structure_stiffness.stiffness(jnp.zeros(robot.elastic))
+    )
     rows = [
         [name, f"{stiffness[k]:.3g}", f"{float(robot.structure_damping[k]):.3g}"]
         for k, name in enumerate(robot.elastic_names)
@@ -84,7 +87,7 @@ def structure_table(robot: ElasticRobot) -> str:
 def frequency_table(robot: ElasticRobot) -> str:
     """First three frequencies at the named poses, with elastic and rigid structure."""
     names = list(robot.poses)
-    poses = np.stack([np.asarray(robot.poses[name]) for name in names])
+    poses = jnp.stack([robot.poses[name] for name in names])
     variants = {"elastic structure": robot}
     if robot.elastic:
         variants["rigid structure"] = robot.flexible_joint()

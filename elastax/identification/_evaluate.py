@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -102,7 +103,7 @@ def evaluate_recording(
     if held is None and fit:
         held = fit_along(robot, recording, command, STEEPNESS_GRID)
         model = held.robot
-    friction = model.drives.motor_friction.torque(command.thetad)
+    friction = jax.vmap(model.drives.motor_friction.torque)(command.thetad)
     encoders = recording.encoders
     chosen = np.array(encoders or range(recording.axes))
 
@@ -160,7 +161,8 @@ def evaluate_recording(
 
 
 def _r2(measured, predicted, remove_mean: bool = True) -> list[float]:
-    r2 = coefficient_of_determination(measured, predicted, remove_mean)
+    pair = jnp.asarray(measured), jnp.asarray(predicted)
+    r2 = coefficient_of_determination(*pair, remove_mean)
     return np.asarray(r2).tolist()
 
 
@@ -177,7 +179,7 @@ def _torsion_by_motor(robot, recording, command) -> np.ndarray:
     sides = np.asarray(drives.ratio * robot.axis_signs)
     inertia = np.asarray(drives.reflected_inertia()) * np.asarray(command.thetadd)
     load = np.asarray(recording.motor_torque) * sides - inertia
-    return np.asarray(drives.stiffness.torsion(jnp.asarray(-load)))
+    return np.asarray(jax.vmap(drives.stiffness.torsion)(jnp.asarray(-load)))
 
 
 def _friction_figures(fit: FrictionFit, chosen: np.ndarray) -> dict:

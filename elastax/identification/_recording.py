@@ -3,7 +3,6 @@
 import warnings
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -16,8 +15,8 @@ from ..signals import AbstractFilter, Reference, check_recording_signal
 TimesByAxes = Float[Array, "times axes"]
 
 SHORTEST = 50  # samples
-# Share of its range by which a speed may change in one sample; the recordings of the
-# KR300 reach 0.03.
+# Share of its peak by which a speed may change in one sample; the recordings of the
+# KR300 reach 0.05.
 _SPEED_STEP = 0.1
 _RESOLUTION = np.deg2rad(0.01)  # of an encoder, generous
 
@@ -118,11 +117,10 @@ def recorded_reference(
             f"{recording.name} must have the {robot.axes} axes of `{robot.name}`, but "
             f"has {recording.axes}"
         )
-    signs, zeros = np.asarray(robot.axis_signs), np.asarray(robot.axis_zeros)
-    derivatives = np.asarray(recording.reference) * signs
-    derivatives[0] += zeros
-    times = np.asarray(recording.times)
-    if len(derivatives) > 3:
+    derivatives = recording.reference * robot.axis_signs[None, None]
+    derivatives = derivatives.at[0].add(robot.axis_zeros[None])
+    times = recording.times
+    if derivatives.shape[0] > 3:
         return Reference.from_derivatives(times, derivatives)
     if filter is None:
         raise ValueError(
@@ -133,37 +131,46 @@ def recorded_reference(
     filtered = Reference.from_samples(
         times, derivatives[0], filter=filter, order=4, settle=delay * recording.dt
     )
-    late = jnp.asarray(filtered.derivatives)[:, delay : delay + len(times)]
+    late = filtered.derivatives[:, delay : delay + times.shape[0]]
     return Reference(times, late)
 
 
 def _check_signals(recording: Recording) -> None:
-    times, name = recording.times, recording.name
-    dt = recording.dt
-    speed = np.abs(np.asarray(recording.motor_speed))
-    limit = 3.0 * np.max(speed, axis=0) * dt + _RESOLUTION
     signals = {
-        "motor_angle": (recording.motor_angle, limit),
-        "motor_speed": (recording.motor_speed, _speed_limit(recording.motor_speed)),
-        "motor_torque": (recording.motor_torque, None),
-        "reference": (recording.reference[0], limit),
-        "link_angle": (recording.link_angle, limit[list(recording.encoders)]),
-        "stored_torque": (recording.stored_torque, None),
+        "motor_angle": recording.motor_angle,
+        "motor_speed": recording.motor_speed,
+        "motor_torque": recording.motor_torque,
+        "link_angle": recording.link_angle,
+        "stored_torque": recording.stored_torque,
     }
-    for field, (values, step) in signals.items():
-        if values is None or values.shape[1] == 0:
-            continue
-        try:
-            check_recording_signal(times, values, step)
-        except ValueError as error:
-            raise ValueError(f"`{field}` of {name}: {error}") from None
+    for k, derivative in enumerate(recording.reference):
+        signals[f"reference[{k}]"] = derivative
+    for field, values in signals.items():
+        _check_signal(recording, field, values)
+    # no angle may move faster than thrice the largest speed of its motor
+    speed = np.abs(np.asarray(recording.motor_speed))
+    limit = 3.0 * np.max(speed, axis=0) * recording.dt + _RESOLUTION
+    _check_signal(recording, "motor_angle", recording.motor_angle, limit)
+    _check_signal(recording, "motor_speed", recording.motor_speed, _speed_limit(speed))
+    _check_signal(recording, "reference[0]", recording.reference[0], limit)
+    link_limit = limit[np.array(recording.encoders, int)]
+    _check_signal(recording, "link_angle", recording.link_angle, link_limit)
     _warn_of_torque_steps(recording)
     _check_following(recording)
 
 
-def _speed_limit(speed) -> np.ndarray:
+def _check_signal(recording: Recording, field: str, values, max_step=None) -> None:
+    if values is None or values.shape[1] == 0:
+        return
+    try:
+        check_recording_signal(recording.times, values, max_step)
+    except ValueError as error:
+        raise ValueError(f"`{field}` of {recording.name}: {error}") from None
+
+
+def _speed_limit(speed: np.ndarray) -> np.ndarray:
     """Largest change of the speed between two samples; slow axes may be noisy."""
-    ranges = np.ptp(np.asarray(speed), axis=0)
+    ranges = np.max(speed, axis=0)
     return _SPEED_STEP * np.maximum(ranges, 0.1 * np.max(ranges)) + 1e-12
 
 

@@ -71,7 +71,6 @@ def coefficient_of_determination(
         remove_mean: whether each signal is taken minus its own mean, so that a
             constant error does not count.
     """
-    measured, predicted = jnp.asarray(measured), jnp.asarray(predicted)
     error = measured - predicted
     if remove_mean:
         error = error - jnp.mean(error, axis=0)[None]
@@ -209,7 +208,7 @@ def fit_friction(
 
 def without_friction(robot: ElasticRobot) -> ElasticRobot:
     """The robot with neither friction nor offset at its motors."""
-    return _with_friction(robot, *np.zeros((3, robot.axes)), np.ones(robot.axes))
+    return _with_friction(robot, np.zeros((3, robot.axes)), np.ones(robot.axes))
 
 
 def fit_along(
@@ -240,7 +239,7 @@ def fit_along(
         for k in range(robot.axes)
     ]
     return FrictionFit(
-        robot=_with_friction(robot, *values, chosen),
+        robot=_with_friction(robot, values, chosen),
         names=("viscous", "coulomb", "offset"),
         values=values,
         deviations=np.stack([one[0] for one in statistics], axis=1),
@@ -318,15 +317,14 @@ def _scaled_payload(robot: ElasticRobot, factor: float) -> ElasticRobot:
     )
 
 
-def _with_friction(robot, viscous, coulomb, offset, steepness) -> ElasticRobot:
+def _with_friction(robot, values, steepness) -> ElasticRobot:
     """The robot with (2.3) and an offset at its motors.
 
     `TwoScaleFriction` writes the law with the argument of tanh, half the steepness.
     """
-    unused = np.zeros(robot.axes)
-    friction = TwoScaleFriction(
-        viscous, coulomb, 0.5 * steepness, unused, np.ones(robot.axes), offset
-    )
+    viscous, coulomb, offset = values
+    unused, one = np.zeros(robot.axes), np.ones(robot.axes)
+    friction = TwoScaleFriction(viscous, coulomb, 0.5 * steepness, unused, one, offset)
     return dataclasses.replace(
         robot, drives=dataclasses.replace(robot.drives, motor_friction=friction)
     )

@@ -1,6 +1,7 @@
 """Time skew between the encoders of the motor and of the link."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -42,11 +43,15 @@ def estimate_skew(
     constant = jnp.mean(difference, axis=0)
     mean = jnp.mean(motor_velocity, axis=0)
     speed = motor_velocity - mean[None]
-    power = jnp.sum(speed**2, axis=0)
+    # scaled by the peak, so that no square underflows; the delay does not depend on it,
+    # and an axis at rest gets a safe operand
+    peak = jax.lax.stop_gradient(jnp.max(jnp.abs(speed), axis=0))
+    moving = peak > 0
+    peak = jnp.where(moving, peak, 1.0)
+    speed = speed / peak[None]
+    power = jnp.where(moving, jnp.sum(speed**2, axis=0), 1.0)
     product = jnp.sum(speed * (difference - constant[None]), axis=0)
-    moving = power > 0
-    # the safe operand keeps the gradient of the branch that is not taken finite
-    delay = jnp.where(moving, product / jnp.where(moving, power, 1.0), 0.0)
+    delay = jnp.where(moving, product / power / peak, 0.0)
     offset = constant - delay * mean
     residual = difference - delay[None] * motor_velocity - offset[None]
     return EncoderSkew(delay, offset, residual)

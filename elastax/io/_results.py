@@ -22,7 +22,6 @@ from ._report import render_report
 RESULT, ARRAYS, REPORT = "result.json", "arrays.npz", "report.html"
 DPI = 120
 FEEDFORWARD = "elastax.feedforward/1"
-INVERSES = ("rigid", "flexible_joint", "asim")
 FIGURES_OF_MERIT = (
     "criterion",
     "path_error_integral",
@@ -153,7 +152,7 @@ def check_schema(result: Mapping[str, Any]) -> None:
     """Check the layout `elastax.feedforward/1`.
 
     Numbers may be `None` where they were not finite; "grid" and "recording" may be
-    absent.
+    absent, and "inverses" holds those that ran.
 
     Raises:
         ValueError: a key is missing, which is named, or holds the wrong kind of value.
@@ -164,8 +163,9 @@ def check_schema(result: Mapping[str, Any]) -> None:
     _get(result, "versions.elastax")
     for key in ("wall_s", "compile_s"):
         _check_number(result, key)
-    _get(result, "inverses")
-    for inverse in _get(result, "inverses"):
+    if not (inverses := _get(result, "inverses")):
+        raise ValueError("`inverses` must hold at least one inverse, but is empty")
+    for inverse in inverses:
         for key in FIGURES_OF_MERIT:
             _check_number(result, f"inverses.{inverse}.{key}")
         for key in PEAKS:
@@ -226,7 +226,7 @@ def _to_plain(result: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]
     """What JSON can hold, and where which numbers were not finite."""
     lost: dict[str, str] = {}
 
-    def convert(value, path):
+    def convert(value: Any, path: str) -> Any:
         if isinstance(value, np.ndarray | np.generic | jax.Array):
             value = np.asarray(value).tolist()
         if value is None or isinstance(value, bool | int | str):

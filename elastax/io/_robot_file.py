@@ -1,6 +1,7 @@
 """Robot files: an elastic robot described in TOML."""
 
 import pathlib
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -165,6 +166,7 @@ def _hinge(hinge, beams, where: str) -> ElasticJoint:
 
 def _clamp_springs(name: str, beam) -> dict[str, float]:
     """Stiffness of the hinges at the clamp [N m/rad] by deformation."""
+    build: Callable[..., BeamSection]
     if beam["section"] == "circular_tube":
         wanted, build = ("diameter",), BeamSection.circular_tube
     else:

@@ -154,7 +154,7 @@ _CYLINDERS = {
 
 def _cylinder(value, where):
     """The keys depend on `kind`."""
-    kind = value.get("kind") if isinstance(value, dict) else None
+    kind = value.get("kind", "") if isinstance(value, dict) else ""
     choice(*_CYLINDERS)(kind, f"{where}.kind")
     return _CYLINDERS[kind](value, where)
 

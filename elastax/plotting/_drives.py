@@ -153,7 +153,11 @@ def _relative_scale(axes: Axes, largest: float) -> None:
     if largest <= 0:
         return
     second = axes.secondary_yaxis(
-        "right", functions=(lambda y: y / largest, lambda y: y * largest)
+        "right",
+        functions=(
+            lambda y: np.asarray(y) / largest,
+            lambda y: np.asarray(y) * largest,
+        ),
     )
     second.set_ylabel("relative [-]", fontsize=8.5)
     second.tick_params(labelsize=8, color="#999999")

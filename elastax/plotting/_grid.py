@@ -52,6 +52,8 @@ def plot_pose_grid(
                 f"`criterion` must have the shape (moves, poses) = "
                 f"{(len(moves), len(points))}, but that of {name} is {c.shape}"
             )
+    if not values:
+        raise ValueError("`criterion` must hold at least one inverse, but is empty")
     with_ratio = numerator in values and denominator in values
     columns = len(values) + with_ratio
     figure, panels = new_figure(
@@ -66,10 +68,12 @@ def plot_pose_grid(
     panels = np.reshape(panels, (len(moves), columns))
     for row, line in enumerate(panels):
         norm = _log_norm(np.stack([c[row] for c in values.values()]))
-        levels = np.geomspace(norm.vmin, norm.vmax, 19)
-        for panel, c in zip(line, values.values()):
-            drawn = _contours(panel, points, c[row], levels, norm, "cividis")
-        _colour_bar(figure, drawn, line[: len(values)], "C [m/s]")
+        levels = np.geomspace(*_ends(norm), 19)
+        drawn = [
+            _contours(panel, points, c[row], levels, norm, "cividis")
+            for panel, c in zip(line, values.values())
+        ]
+        _colour_bar(figure, drawn[0], line[: len(values)], "C [m/s]")
         line[0].set_ylabel(f"{_move_name(moves[row])}\nA{axes[1] + 1} [deg]")
     for panel, name in zip(panels[0], values):
         panel.set_title(label_of(name), fontsize=10, color=line_of(name)["color"])
@@ -120,6 +124,13 @@ def _number(panel: Axes, point, text: str, points) -> None:
     )
 
 
+def _ends(norm: Normalize) -> tuple[float, float]:
+    """Values at the ends of a scale."""
+    if norm.vmin is None or norm.vmax is None:
+        raise ValueError("the scale must have both ends, but lacks one")
+    return float(norm.vmin), float(norm.vmax)
+
+
 def _log_norm(values: np.ndarray) -> LogNorm:
     positive = values[np.isfinite(values) & (values > 0)]
     if not positive.size:
@@ -150,16 +161,16 @@ def _contours(panel: Axes, points, values, levels, norm, colours):
 def _colour_bar(figure: Figure, drawn, panels, label: str) -> None:
     bar = figure.colorbar(drawn, ax=list(panels), pad=0.02, aspect=18)
     bar.set_label(label, fontsize=9.5)
-    low, high = float(drawn.norm.vmin), float(drawn.norm.vmax)
+    low, high = _ends(drawn.norm)
     if isinstance(drawn.norm, LogNorm):
         ticks = np.geomspace(1.05 * low, high / 1.05, 5)
     elif isinstance(drawn.norm, TwoSlopeNorm):
         ticks = np.array([0.0, 0.25, 0.5, 0.75, 1.0, 0.5 + 0.5 * high, high])
     else:
-        ticks = MaxNLocator(5).tick_values(low, high)
+        ticks = np.asarray(MaxNLocator(5).tick_values(low, high))
         ticks = ticks[ticks <= high]
     bar.minorticks_off()
-    bar.set_ticks(ticks, labels=[f"{tick:.2g}" for tick in ticks])
+    bar.set_ticks(ticks.tolist(), labels=[f"{tick:.2g}" for tick in ticks])
     bar.ax.tick_params(labelsize=8.5)
 
 

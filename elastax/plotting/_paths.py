@@ -56,7 +56,9 @@ def plot_path_error(runs: Mapping[str, Run]) -> Figure:
     return figure
 
 
-def plot_wrist_acceleration(runs: Mapping[str, Run], *, before: float = 0.1) -> Figure:
+def plot_wrist_acceleration(
+    runs: Mapping[str, Run], *, before: float | int = 0.1
+) -> Figure:
     """Acceleration of the wrist centre after the stop, the window of C shaded.
 
     Args:
@@ -116,7 +118,7 @@ def plot_cartesian_path(
     runs: Mapping[str, Run],
     tool_path: ArrayLike,
     *,
-    magnification: float | None = None,
+    magnification: float | int | None = None,
 ) -> Figure:
     """The tool's path in its plane with magnified deviations, and the error over time.
 

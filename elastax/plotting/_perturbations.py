@@ -3,13 +3,14 @@
 from collections.abc import Mapping
 
 import numpy as np
+from jax.typing import ArrayLike
 from matplotlib.figure import Figure
 
 from ._style import COLOURS, INK, add_legend, legend_of, new_figure
 
 
 def plot_perturbations(
-    ratios: Mapping[str, float], *, limit: float | None = None
+    ratios: Mapping[str, ArrayLike], *, limit: float | int | None = None
 ) -> Figure:
     """Path error of ASIM over that of the flexible-joint inverse, by wrong parameters.
 
@@ -17,7 +18,7 @@ def plot_perturbations(
         ratios: by the name of the case, the nominal one first.
         limit: marked if given.
     """
-    values = np.array([float(value) for value in ratios.values()])
+    values = np.array([float(np.asarray(value)) for value in ratios.values()])
     height = 1.4 + 0.36 * len(values)
     title = "Path error when the model is wrong: ASIM over flexible joint (RLFJ)"
     figure, axes = new_figure(title, 1, 1, height)

@@ -17,8 +17,8 @@ def plot_recording(
     stored_torque: ArrayLike | None = None,
     measured_windup: ArrayLike | None = None,
     predicted_windup: ArrayLike | None = None,
-    torque_r2: Sequence[float] | None = None,
-    windup_r2: Sequence[float] | None = None,
+    torque_r2: ArrayLike | None = None,
+    windup_r2: ArrayLike | None = None,
     axis_names: Sequence[str] = ("A1", "A2", "A3"),
 ) -> Figure:
     """A recording against the model: motor torques and wind-up of the gears.
@@ -32,7 +32,7 @@ def plot_recording(
         torque_r2, windup_r2: coefficients of determination, shown as given.
         axis_names: one per column of the arrays.
     """
-    windup = measured_windup is not None and predicted_windup is not None
+    windup = not (measured_windup is None or predicted_windup is None)
     count = len(axis_names)
     figure, panels = new_figure(
         "Recording against model",
@@ -44,7 +44,7 @@ def plot_recording(
     )
     panels = np.reshape(panels, (count, 1 + windup))
     signals = [("motor torque, motor side", "[N m]", 1.0, torque_r2)]
-    sides = [(measured_torque, predicted_torque, stored_torque)]
+    sides: list = [(measured_torque, predicted_torque, stored_torque)]
     if windup:
         signals.append(("wind-up, skew removed", "[mrad]", 1e3, windup_r2))
         sides.append((measured_windup, predicted_windup, None))
@@ -63,7 +63,7 @@ def plot_recording(
             draw(predicted, color=COLOURS["asim"], lw=1.1, label="predicted")
             axis.set_ylabel(f"{name} {unit}")
             if r2 is not None:
-                text = f"R² = {float(r2[k]):.3f}"
+                text = f"R² = {float(np.asarray(r2)[k]):.3f}"
                 axis.set_title(text, fontsize=9.5, loc="right", color=INK)
     add_legend(figure, *legend_of(panels[0, 0]))
     return figure

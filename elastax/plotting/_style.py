@@ -33,9 +33,9 @@ def save_figure(figure: Figure, path: str | pathlib.Path) -> None:
 def new_figure(title, rows, columns, height, width=WIDTH, **options):
     """Figure with its own canvas, and its panels."""
     ratios = options.pop("width_ratios", None)
-    figure = Figure((width, height), dpi=DPI, layout="constrained", facecolor="white")
+    figure = Figure((width, height), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
-    figure.get_layout_engine().set(w_pad=0.08, h_pad=0.05)
+    figure.set_layout_engine("constrained", w_pad=0.08, h_pad=0.05)
     figure.suptitle(
         title, fontsize=11.5, fontweight="bold", x=0.01, ha="left", color=INK
     )
@@ -57,8 +57,12 @@ def new_figure(title, rows, columns, height, width=WIDTH, **options):
 def legend_of(axes: Axes) -> tuple[list[Line2D], list[str]]:
     """Handles, of one width, and labels of what a panel shows."""
     handles, labels = axes.get_legend_handles_labels()
-    styles = [(handle.get_color(), handle.get_linestyle()) for handle in handles]
-    return [Line2D([], [], color=c, ls=style, lw=2.2) for c, style in styles], labels
+    lines = []
+    for handle in handles:
+        assert isinstance(handle, Line2D), "legends are made of lines"
+        style = {"color": handle.get_color(), "linestyle": handle.get_linestyle()}
+        lines.append(Line2D([], [], linewidth=2.2, **style))
+    return lines, labels
 
 
 def add_legend(figure: Figure, handles, labels, columns: int | None = None) -> None:

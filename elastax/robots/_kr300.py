@@ -136,8 +136,8 @@ def kr300() -> ElasticRobot:
         assumptions=(
             *quantec.ASSUMPTIONS,
             "payload: the recordings' 150 kg of link 6 less the flange's 17.78 kg, "
-            "first moments kept; its inertia is that of a steel disc of 0.4 m diameter. "
-            "The tensor stored for link 6, too small for both, is kept as the flange's",
+            "first moments kept; its inertia is that of a steel disc 0.4 m across; "
+            "the tensor stored for link 6, too small for both, is kept as the flange's",
             "speeds: 4500 rpm at the motors",
             "A2 widened to +20 deg for the stretched pose, the maker's limit is -5 deg",
         ),

@@ -55,8 +55,9 @@ def reference():
 
 
 @pytest.mark.parametrize("name", SPRINGS)
-def test_command_moves_the_plant_along_the_reference(name, reference):
+def test_command_moves_the_plant_along_the_reference(name):
     """The plant's accelerations under the command are those of the reference."""
+    reference = systems.smooth_reference(START, CHANGE, 0.3, dt=2.5e-4)
     robot = flexible_arm(SPRINGS[name])
     command = feedforward(FlexibleJointInverse(), robot, reference)
 
@@ -71,11 +72,11 @@ def test_command_moves_the_plant_along_the_reference(name, reference):
     scale = float(jnp.max(jnp.abs(qdd)))
     assert_close(got, qdd, rtol=0, atol=1e-9 * scale)
     assert_close(motors, command.thetadd, rtol=0, atol=1e-9 * scale)
-    # speeds and accelerations are the derivatives of the motor angles: the fourth
-    # order difference over 1 ms of a motion of 0.3 s
+    # speeds and accelerations are the derivatives of the motor angles; the torsion's
+    # error of third order in the sample counts times stiffness over damping, squared
     for value, rate in ((command.theta, "thetad"), (command.thetad, "thetadd")):
         value = np.asarray(value)
-        slope = (8 * (value[3:-1] - value[1:-3]) - value[4:] + value[:-4]) / 12e-3
+        slope = (8 * (value[3:-1] - value[1:-3]) - value[4:] + value[:-4]) / 3e-3
         desired = np.asarray(getattr(command, rate))[2:-2]
         assert_close(slope, desired, rtol=0, atol=1e-6 * np.abs(desired).max())
 
@@ -87,13 +88,18 @@ def test_plant_follows_to_the_tolerance_of_the_solver(reference):
     @eqx.filter_jit
     def drive(robot, controller):
         command = FlexibleJointInverse().feedforward(robot, reference)
-        motion = simulate(robot, command, controller, rtol=1e-8, atol=1e-10)
+        motion = simulate(robot, command, controller, rtol=1e-9, atol=1e-11)
         return command, motion
 
-    for controller in (CascadeMotorControl(), IdealMotorControl()):
+    # a command sampled at 1 ms and interpolated: angles to fourth order, 9e-10 and
+    # 2e-9 rad here, torques to third order, 3e-7 and 7e-7 rad
+    for controller, bound in (
+        (CascadeMotorControl(), 1e-6),
+        (IdealMotorControl(), 1e-8),
+    ):
         command, motion = drive(robot, controller)
-        assert_close(motion.q, reference.positions, rtol=0, atol=1e-7)
-        assert_close(motion.theta, command.theta, rtol=0, atol=1e-7)
+        assert_close(motion.q, reference.positions, rtol=0, atol=bound)
+        assert_close(motion.theta, command.theta, rtol=0, atol=1.5 * bound)
         peak = float(jnp.max(jnp.abs(command.tau_m)))
         assert_close(motion.tau_m, command.tau_m, rtol=0, atol=1e-4 * peak)
 
