@@ -1,5 +1,7 @@
 """Array aliases with named axes, and the converter of real parameters."""
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -15,7 +17,7 @@ Transform = Float[Array, "4 4"]
 Times = Float[Array, " times"]
 
 
-def as_real(value):
+def as_real(value: Any) -> Array:
     """`value` as a floating-point array of a definite type.
 
     Numbers and integer arrays take the default float type.
@@ -31,7 +33,7 @@ def as_real(value):
     return jnp.asarray(array, array.dtype if real else default)
 
 
-def as_optional_real(value):
+def as_optional_real(value: Any) -> Array | None:
     """Like `as_real`, but `None` stays `None`."""
     return None if value is None else as_real(value)
 

@@ -2,6 +2,7 @@
 
 import argparse
 import dataclasses
+from typing import Any
 
 
 INVERSES = ("rigid", "flexible_joint", "asim")
@@ -80,7 +81,7 @@ def parse(argv: list[str] | None) -> tuple[str, FeedforwardConfig | InfoConfig]:
     info.add_argument("--quiet", action="store_true", help="no progress")
     values = vars(parser.parse_args(argv))
     command = values.pop("command")
-    values = {
+    values: dict[str, Any] = {
         key: tuple(value) if isinstance(value, list) else value
         for key, value in values.items()
     }

@@ -4,6 +4,7 @@ import dataclasses
 import pathlib
 import sys
 import time
+from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
@@ -44,8 +45,8 @@ class Compiled:
         seconds: time that compilation took.
     """
 
-    inverses: dict
-    plant: object
+    inverses: dict[str, Callable]
+    plant: Callable
     seconds: float
 
 

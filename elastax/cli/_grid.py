@@ -77,6 +77,7 @@ def run_grid(
     """
     if robot.axes < 3:
         raise ValueError(f"--grid needs three axes, but {robot.name} has {robot.axes}")
+    assert config.grid is not None
     base = resolve_pose(robot, config.pose)
     a2 = np.linspace(-SPAN, 0.0, config.grid)
     a3 = np.linspace(0.0, SPAN, config.grid)

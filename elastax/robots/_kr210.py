@@ -10,13 +10,15 @@ from ._kuka_arm import arm_parts
 def kr210() -> ElasticRobot:
     """KUKA KR210, 2.7 m reach, with a dumb-bell of 210 kg.
 
-    Bodies from a public MATLAB model of a KR210 used for milling (values from CAD), with
-    the milling spindle taken off; motors, gears, friction and counterbalance of the KR300
+    Bodies from a public MATLAB model of a KR210 used for milling (values from CAD),
+    with
+    the milling spindle taken off; motors, gears, friction and counterbalance of the
+    KR300
     [Weigand2021]; structure estimated from assumed sections. KUKA has not published the
     elastic parameters: what is assumed stands in `assumptions`.
 
-    The joint angles are KUKA's: zero is the stretched arm, A1 turns about -z, positive A2
-    and A3 lower the arm.
+    The joint angles are KUKA's: zero is the stretched arm, A1 turns about -z, positive
+    A2 and A3 lower the arm.
     """
     right = np.pi / 2
     # theta, d, a, alpha [rad, m]; base height .2256 in front
@@ -32,7 +34,9 @@ def kr210() -> ElasticRobot:
     )
     tensor = quantec.tensor
     bodies = [
-        Body("carousel", 259.85, (-0.36493, 0.22028, 0.00434), tensor(8.88, 13.72, 16.27)),
+        Body(
+            "carousel", 259.85, (-0.36493, 0.22028, 0.00434), tensor(8.88, 13.72, 16.27)
+        ),
         Body(
             "link arm",
             334.71,
@@ -81,7 +85,9 @@ def kr210() -> ElasticRobot:
             "upright": degrees([0.0, -90.0, 0.0, 0.0, 0.0, 0.0]),
         },
         counterbalance=quantec.counterbalance(),
-        tool=np.block([[np.eye(3), load[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]]),
+        tool=np.block(
+            [[np.eye(3), load[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]]
+        ),
         sources=(
             "bodies and kinematics: public MATLAB model of a KR210 for milling",
             "motors, gears of axes 1 to 3, friction, counterbalance: KR300 R2500 ultra "
@@ -94,10 +100,10 @@ def kr210() -> ElasticRobot:
             "counterbalance of the KR300; the KR210 of the text has a spring",
             "payload: dumb-bell, two steel discs 0.4 m apart, 0.24 m in front of the "
             "flange; flange body without spindle: that of the KR300, inertia estimated",
-            "flange 0.215 m in front of the wrist centre (the source's 0.42 m include the "
-            "spindle)",
-            "A2 widened to +20 deg: the text works from the stretched arm (A2 = 0), the "
-            "maker's limit is -5 deg",
+            "flange 0.215 m in front of the wrist centre (the source's 0.42 m include "
+            "the spindle)",
+            "A2 widened to +20 deg: the text works from the stretched arm (A2 = 0), "
+            "the maker's limit is -5 deg",
             "products of inertia of the link arm: read as tensor elements",
         ),
     )

@@ -79,7 +79,7 @@ def test_gradient_of_the_figure_of_merit(robot, exact):
         changed = eqx.tree_at(
             lambda r: (
                 r.payload.mass,
-                r.drives.stiffness.stiffness,
+                r.drives.stiffness.linear,
                 r.drives.motor_friction.coulomb,
             ),
             robot,
@@ -92,7 +92,7 @@ def test_gradient_of_the_figure_of_merit(robot, exact):
     assert_gradient(
         figure,
         robot.payload.mass,
-        drives.stiffness.stiffness,
+        drives.stiffness.linear,
         drives.motor_friction.coulomb,
     )
 
