@@ -162,7 +162,9 @@ def compile_programs(
     command = bare(inverses[names[0]](robot, reference))
     progress.say("compiling the elastic plant ...")
     controller = CascadeMotorControl()
-    plant = jax.jit(lambda p, c, r: run_command(p, c, r, controller))
+    # a failed simulation shows in its figures; an error raised from inside the program
+    # would keep it out of the persistent cache
+    plant = jax.jit(lambda p, c, r: run_command(p, c, r, controller, throw=False))
     compiled = plant.lower(robot, command, reference).compile()
     return Compiled(inverses, compiled, time.perf_counter() - start)
 

@@ -13,6 +13,9 @@ def configure() -> None:
     `JAX_COMPILATION_CACHE_DIR` goes before both.
     """
     jax.config.update("jax_enable_x64", True)
+    # checks inside programs give NaN, which the job reports: a program that can call
+    # back into Python would not be kept in the cache
+    os.environ.setdefault("EQX_ON_ERROR", "nan")
     if "JAX_COMPILATION_CACHE_DIR" in os.environ:
         return
     default = pathlib.Path.home() / ".cache" / "elastax"

@@ -195,7 +195,11 @@ def resting_deformation(model: ElasticRobot, forcing: Series) -> PerElastic:
 
 
 def advance_deformation(
-    model: ElasticRobot, eta: PerElastic, before: Series, after: Series, dt: Scalar
+    model: ElasticRobot,
+    eta: PerElastic,
+    before: Series,
+    after: Series,
+    dt: Scalar | float,
 ) -> PerElastic:
     """Deformations one sample later [rad].
 
@@ -221,7 +225,7 @@ def deformation_series(model: ElasticRobot, eta: PerElastic, forcing: Series) ->
 
 
 def deformations_along(
-    model: ElasticRobot, forcing: Float[Array, "times 3 elastic"], dt: Scalar
+    model: ElasticRobot, forcing: Float[Array, "times 3 elastic"], dt: Scalar | float
 ) -> Float[Array, "times elastic"]:
     """Deformations [rad] over a whole motion that starts at rest."""
 

@@ -18,7 +18,7 @@ class AbstractDampingSignal(eqx.Module):
     """Damping factor over time from the smallest singular value over time."""
 
     @abc.abstractmethod
-    def init(self, smallest: Scalar, dt: Scalar) -> Any:
+    def init(self, smallest: Scalar, dt: Scalar | float) -> Any:
         """State at rest at the first singular value."""
 
     @abc.abstractmethod
@@ -36,7 +36,7 @@ class AbstractDampingSignal(eqx.Module):
 
     @abc.abstractmethod
     def along(
-        self, smallest: Float[Array, " times"], dt: Scalar, order: int
+        self, smallest: Float[Array, " times"], dt: Scalar | float, order: int
     ) -> Float[Array, "times terms"]:
         """`step` over a whole motion: series coefficients at every sample."""
 
@@ -57,7 +57,7 @@ class FilteredDamping(AbstractDampingSignal):
     law: AbstractDamping
     filter: AbstractFilter = CriticallyDampedFilter(4, 10.0)
 
-    def init(self, smallest: Scalar, dt: Scalar) -> Any:
+    def init(self, smallest: Scalar, dt: Scalar | float) -> Any:
         start = smallest[None]
         return self.filter.init(start), start, self.filter.discretise(dt)
 
@@ -71,7 +71,7 @@ class FilteredDamping(AbstractDampingSignal):
         return compose(self.law, from_derivatives(smooth)), (memory, now, hold)
 
     def along(
-        self, smallest: Float[Array, " times"], dt: Scalar, order: int
+        self, smallest: Float[Array, " times"], dt: Scalar | float, order: int
     ) -> Float[Array, "times terms"]:
         smooth = self.filter.apply(smallest[:, None], dt, order)[..., 0].T
         return jax.vmap(lambda d: compose(self.law, from_derivatives(d)).coefficients)(
@@ -91,7 +91,7 @@ class FrozenDamping(AbstractDampingSignal):
 
     law: AbstractDamping
 
-    def init(self, smallest: Scalar, dt: Scalar) -> Any:
+    def init(self, smallest: Scalar, dt: Scalar | float) -> Any:
         return None
 
     def step(
@@ -101,7 +101,7 @@ class FrozenDamping(AbstractDampingSignal):
         return Series(jnp.zeros((order + 1,), value.dtype).at[0].set(value)), None
 
     def along(
-        self, smallest: Float[Array, " times"], dt: Scalar, order: int
+        self, smallest: Float[Array, " times"], dt: Scalar | float, order: int
     ) -> Float[Array, "times terms"]:
         value = self.law(smallest)[:, None]
         rest = jnp.zeros((value.shape[0], order), value.dtype)

@@ -41,7 +41,11 @@ def resting_torsion(drives: DriveTrain, load: Series) -> PerJoint:
 
 
 def advance_torsion(
-    drives: DriveTrain, torsion: PerJoint, before: Series, after: Series, dt: Scalar
+    drives: DriveTrain,
+    torsion: PerJoint,
+    before: Series,
+    after: Series,
+    dt: Scalar | float,
 ) -> PerJoint:
     """Torsion [rad] one sample later.
 
@@ -53,7 +57,7 @@ def advance_torsion(
 
 
 def torsions_along(
-    drives: DriveTrain, loads: Float[Array, "times 2 axes"], dt: Scalar
+    drives: DriveTrain, loads: Float[Array, "times 2 axes"], dt: Scalar | float
 ) -> Float[Array, "times axes"]:
     """Torsions [rad] over a whole motion that starts at rest.
 
