@@ -1,7 +1,7 @@
 """Modelling, inverting and simulating structurally elastic industrial robots.
 
-The names of the README stand here; they are imported from their packages on first use, so
-that the command line can speak before JAX is loaded.
+The names of the README stand here; they are imported from their packages on first use,
+so that the command line can speak before JAX is loaded.
 """
 
 import importlib

@@ -98,9 +98,7 @@ def run_grid(
     def case(robot, inverse, start, move):
         profile = point_to_point(robot, start, move)
         reference = move_reference(profile, filter, duration)
-        run = run_feedforward(
-            robot, robot, inverse, reference, controller, throw=False
-        )
+        run = run_feedforward(robot, robot, inverse, reference, controller, throw=False)
         return run.judgement.criterion, run.judgement.path_error_integral
 
     criterion, integral = {}, {}

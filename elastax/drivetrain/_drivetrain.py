@@ -14,9 +14,9 @@ class DriveTrain(eqx.Module):
 
     Angles and torques are those of the output side: $\varphi = \varphi_m / i$,
     $\tau = i\,\tau_m$, $\Theta = i^2 J$. The gear transmits
-    $\tau_g = k(q - \theta) + d\,(\dot q - \dot\theta)$, which acts on the motor and, with
-    the opposite sign, on the link. The gyroscopic coupling of the rotors to the structure
-    is neglected, as in the text.
+    $\tau_g = k(q - \theta) + d\,(\dot q - \dot\theta)$, which acts on the motor and,
+    with the opposite sign, on the link. The gyroscopic coupling of the rotors to the
+    structure is neglected, as in the text.
 
     Attributes:
         ratio: gear ratios motor / output, shape (joints,); the sign is kept.

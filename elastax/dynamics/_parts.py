@@ -172,6 +172,11 @@ def assemble(
                 if mark:
                     wrist, mark = len(roles), False
             case ElasticJoint():
+                if part.name in hinge_axes:
+                    raise ValueError(
+                        f"every elastic joint must have a name of its own, but "
+                        f"`{part.name}` is there twice"
+                    )
                 direction, kind = part.axis, JointKind.REVOLUTE
                 role = ElasticRole(len(elastic_names))
                 hinge_axes[part.name] = (len(elastic_names), part.axis)

@@ -3,6 +3,7 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from elastax.dynamics import equations_of_motion, forward_dynamics, tool_state
 
 from tests import systems
@@ -155,6 +156,7 @@ def test_blocks_of_rigid_gears():
     assert stiff.M_ee.shape == (0, 0)
 
 
+@pytest.mark.slow
 def test_gradient():
     robot = systems.elastic_2r(counterbalance=systems.spring_counterbalance(20.0))
     q, eta, theta, qd, etad, thetad, tau_m, _, _ = (

@@ -21,7 +21,7 @@ from tests import systems
 from tests.helpers import assert_close, assert_gradient, load_vectors
 
 
-SIZES = [(3, 2, False), (8, 12, True)]
+SIZES = [pytest.param(3, 2, False, marks=pytest.mark.slow), (8, 12, True)]
 
 
 @pytest.mark.parametrize(("axes", "elastic", "counterbalance"), SIZES)

@@ -130,6 +130,7 @@ def test_vmap_is_a_loop():
         assert int(together.steps[k]) == int(alone.steps)
 
 
+@pytest.mark.slow
 def test_ideal_control_imposes_the_motors():
     """The load swings on its gear behind motors that move as commanded."""
     robot = systems.two_mass_oscillator(**MASSES)

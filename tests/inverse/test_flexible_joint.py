@@ -84,6 +84,7 @@ def test_command_moves_the_plant_along_the_reference(name):
         assert_close(slope, desired, rtol=0, atol=bound * np.abs(desired).max())
 
 
+@pytest.mark.slow
 def test_plant_follows_to_the_tolerance_of_the_solver(reference):
     """Under the exact inverse nothing is left to the controllers."""
     robot = flexible_arm(SPRINGS["limited"])
@@ -168,6 +169,7 @@ def test_without_structural_elasticity_asim_is_flexible_joint(reference):
     )
 
 
+@pytest.mark.slow
 def test_gradient():
     model = flexible_arm(SPRINGS["cubic"])
     short = systems.smooth_reference(START, CHANGE, 0.3, dt=0.05)

@@ -137,9 +137,7 @@ def test_gradient():
     def end(spring, damping, x):
         return step_on(spring, damping, x, 0.2, 0.03, 2)
 
-    for name in ("linear", "cubic"):
-        start = jnp.array([0.2, -0.1])
-        assert_gradient(end, SPRINGS[name], DAMPING, start)
+    assert_gradient(end, SPRINGS["cubic"], DAMPING, jnp.array([0.2, -0.1]))
 
 
 def test_step_response_of_the_vectors():
