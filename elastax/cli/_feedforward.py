@@ -118,6 +118,9 @@ def _check(config: FeedforwardConfig) -> None:
         )
     if config.grid is not None and config.grid < 2:
         raise ValueError(f"--grid must be 2 or more poses, but is {config.grid}")
+    out = pathlib.Path(config.out)
+    if out.exists() and not out.is_dir():
+        raise ValueError(f"--out must be a folder, but {config.out} is a file")
     if not config.cutoff > 0:
         raise ValueError(f"--cutoff must be positive [Hz], but is {config.cutoff:g}")
     if config.identify_on is not None and config.recording is None:
