@@ -6,6 +6,7 @@ from ..drivetrain import CoulombViscousFriction, DriveTrain, LinearStiffness
 from ..dynamics import Body, ElasticRobot, JointLimits, assemble
 from ..structure import BeamSection
 from . import _quantec as quantec
+from ._kr210 import link_bodies
 from ._kuka_arm import arm_parts
 
 
@@ -42,28 +43,7 @@ def kr16() -> ElasticRobot:
             [np.pi, -0.158, 0.0, np.pi],
         ]
     )
-    tensor = quantec.tensor
-    bodies = [
-        _scaled(
-            "carousel", 259.85, (-0.36493, 0.22028, 0.00434), tensor(8.88, 13.72, 16.27)
-        ),
-        _scaled(
-            "link arm",
-            334.71,
-            (-0.71793, 0.02787, -0.23573),
-            tensor(6.19, 55.86, 55.17, xy=-1.69, xz=-6.13),
-        ),
-        _scaled(
-            "arm", 217.46, (-0.02558, 0.02189, -0.31108), tensor(25.44, 25.92, 2.31)
-        ),
-        _scaled(
-            "forearm", 12.17, (0.0, 0.12343, 0.00135), tensor(0.1285, 0.0298, 0.1302)
-        ),
-        _scaled(
-            "wrist", 29.53, (0.00005, -0.024, -0.0467), tensor(0.402, 0.238, 0.288)
-        ),
-        _scaled("flange", 17.78, (0.0, 0.0, -0.050), tensor(0.06, 0.06, 0.09)),
-    ]
+    bodies = [_scaled(body) for body in link_bodies()]
     size = LENGTH_SCALE
     parts = arm_parts(
         table,
@@ -126,13 +106,13 @@ def kr16() -> ElasticRobot:
     return robot.with_payload(mass, load, mass * edge**2 / 6 * np.eye(3))
 
 
-def _scaled(name, mass, com, inertia) -> Body:
-    """Similar body; arguments are those of the large one."""
+def _scaled(body: Body) -> Body:
+    """Similar body of the small arm."""
     return Body(
-        name,
-        MASS_SCALE * mass,
-        LENGTH_SCALE * np.asarray(com),
-        INERTIA_SCALE * np.asarray(inertia),
+        body.name,
+        MASS_SCALE * np.asarray(body.mass),
+        LENGTH_SCALE * np.asarray(body.com),
+        INERTIA_SCALE * np.asarray(body.inertia),
     )
 
 

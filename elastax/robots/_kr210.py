@@ -11,11 +11,9 @@ def kr210() -> ElasticRobot:
     """KUKA KR210, 2.7 m reach, with a dumb-bell of 210 kg.
 
     Bodies from a public MATLAB model of a KR210 used for milling (values from CAD),
-    with
-    the milling spindle taken off; motors, gears, friction and counterbalance of the
-    KR300
-    [Weigand2021]; structure estimated from assumed sections. KUKA has not published the
-    elastic parameters: what is assumed stands in `assumptions`.
+    with the milling spindle taken off; motors, gears, friction and counterbalance of
+    the KR300 [Weigand2021]; structure estimated from assumed sections. KUKA has not
+    published the elastic parameters: what is assumed stands in `assumptions`.
 
     The joint angles are KUKA's: zero is the stretched arm, A1 turns about -z, positive
     A2 and A3 lower the arm.
@@ -32,27 +30,11 @@ def kr210() -> ElasticRobot:
             [np.pi, -0.215, 0.0, np.pi],
         ]
     )
-    tensor = quantec.tensor
-    bodies = [
-        Body(
-            "carousel", 259.85, (-0.36493, 0.22028, 0.00434), tensor(8.88, 13.72, 16.27)
-        ),
-        Body(
-            "link arm",
-            334.71,
-            (-0.71793, 0.02787, -0.23573),
-            tensor(6.19, 55.86, 55.17, xy=-1.69, xz=-6.13),
-        ),
-        Body("arm", 217.46, (-0.02558, 0.02189, -0.31108), tensor(25.44, 25.92, 2.31)),
-        Body("forearm", 12.17, (0.0, 0.12343, 0.00135), tensor(0.1285, 0.0298, 0.1302)),
-        Body("wrist", 29.53, (0.00005, -0.024, -0.0467), tensor(0.402, 0.238, 0.288)),
-        Body("flange", 17.78, (0.0, 0.0, -0.050), tensor(0.06, 0.06, 0.09)),
-    ]
     parts = [
         Offset((0.0, 0.0, 0.2256)),
         *arm_parts(
             table,
-            bodies,
+            link_bodies(),
             bearing_stiffness=(
                 quantec.BEARING_STIFFNESS_1,
                 quantec.BEARING_STIFFNESS_3,
@@ -108,3 +90,23 @@ def kr210() -> ElasticRobot:
         ),
     )
     return robot.with_payload(210.0, load, np.diag([9.6, 3.8, 9.6]))
+
+
+def link_bodies() -> list[Body]:
+    """Bodies of the links in their distal frames, without the milling spindle."""
+    tensor = quantec.tensor
+    return [
+        Body(
+            "carousel", 259.85, (-0.36493, 0.22028, 0.00434), tensor(8.88, 13.72, 16.27)
+        ),
+        Body(
+            "link arm",
+            334.71,
+            (-0.71793, 0.02787, -0.23573),
+            tensor(6.19, 55.86, 55.17, xy=-1.69, xz=-6.13),
+        ),
+        Body("arm", 217.46, (-0.02558, 0.02189, -0.31108), tensor(25.44, 25.92, 2.31)),
+        Body("forearm", 12.17, (0.0, 0.12343, 0.00135), tensor(0.1285, 0.0298, 0.1302)),
+        Body("wrist", 29.53, (0.00005, -0.024, -0.0467), tensor(0.402, 0.238, 0.288)),
+        Body("flange", 17.78, (0.0, 0.0, -0.050), tensor(0.06, 0.06, 0.09)),
+    ]

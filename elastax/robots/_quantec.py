@@ -26,9 +26,8 @@ STEEPNESS = 10.0  # s/rad, argument of the tanh
 STEEPNESS_FINE = np.array([530.0, 28994.0, 31572.0, 837.45, 4855.06, 2465.3])  # s/rad
 OFFSET = np.array([54.024, -255.55, -200.53, -2.1199, 0.49337, 0.3674])  # N m
 
-# axes 1 to 3 [Weigand2021]; axes 4 to 6 from a public file of a KR210-like arm without
-# a
-# source of its own: an order of magnitude
+# axes 1 to 3 [Weigand2021]; axes 4 to 6 from a public file of a KR210-like arm that
+# names no source of its own: an order of magnitude
 GEAR_STIFFNESS = np.array(
     [4_577_800.0, 7_518_900.0, 4_099_900.0, 360_000.0, 370_000.0, 380_000.0]
 )  # N m/rad
