@@ -12,7 +12,13 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 # Before the first import of the package. Not by the option of jaxtyping's pytest
 # plugin: the workers of pytest-xdist never see it.
-jaxtyping.install_import_hook("elastax", "beartype.beartype")
+# The inner loops of `_kernel` handle single numbers: there every check would be felt.
+CHECKED = [
+    f"elastax.{path.stem}"
+    for path in sorted((ROOT / "elastax").iterdir())
+    if path.stem not in ("__init__", "_kernel") and path.suffix in ("", ".py")
+]
+jaxtyping.install_import_hook(CHECKED, "beartype.beartype")
 
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")

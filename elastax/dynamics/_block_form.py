@@ -6,8 +6,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._custom_types import PerElastic, PerJoint
+from .._kernel import kernel
 from ._forces import applied_forces
-from ._newton_euler import multibody
+from ._newton_euler import generalised_forces, multibody
 from ._robot import ElasticRobot
 
 
@@ -36,6 +37,7 @@ class EquationsOfMotion(eqx.Module):
     Theta: Float[Array, " motors"]
 
 
+@kernel
 def equations_of_motion(
     robot: ElasticRobot,
     q: PerJoint,
@@ -87,6 +89,7 @@ def equations_of_motion(
     )
 
 
+@kernel
 def forward_dynamics(
     robot: ElasticRobot,
     q: PerJoint,
@@ -97,7 +100,10 @@ def forward_dynamics(
     thetad: PerJoint,
     tau_m: PerJoint,
 ) -> tuple[PerJoint, PerElastic, PerJoint]:
-    """Accelerations of joints, structure and motors under the motor torque `tau_m`.
+    r"""Accelerations of joints, structure and motors under the motor torque `tau_m`.
+
+    The derivatives need no derivative of the mass matrix: where $a$ solves
+    $r(x, a) = 0$, the inverse dynamics, $M\,\delta a = -\partial_x r\,\delta x$.
 
     Args:
         robot: the robot.
@@ -108,18 +114,50 @@ def forward_dynamics(
         qdd (axes,), etadd (elastic,), thetadd (axes,) [rad/s^2]; for rigid gears
         thetadd equals qdd.
     """
+    state = (q, eta, theta, qd, etad, thetad)
+    acceleration = _link_acceleration(robot, state, tau_m)
+    qdd, etadd = acceleration[: robot.axes], acceleration[robot.axes :]
+    if not robot.has_elastic_gears:
+        return qdd, etadd, qdd
+    gear = robot.drives.gear_torque(q - theta, qd - thetad)
+    load = robot.drives.motor_friction.torque(thetad) - gear
+    return qdd, etadd, (tau_m - load) / robot.drives.reflected_inertia()
+
+
+@jax.custom_jvp
+def _link_acceleration(robot: ElasticRobot, state, tau_m):
+    eom = equations_of_motion(robot, *state)
+    drive = jnp.zeros_like(tau_m) if robot.has_elastic_gears else tau_m
+    force = jnp.concatenate([drive - eom.h_a, -eom.h_e])
+    return _solve(_mass(eom), force)
+
+
+@_link_acceleration.defjvp
+def _link_acceleration_jvp(primals, tangents):
+    robot, state, tau_m = primals
+    acceleration = _link_acceleration(robot, state, tau_m)
     n = robot.axes
-    eom = equations_of_motion(robot, q, eta, theta, qd, etad, thetad)
-    mass = jnp.block([[eom.M_aa, eom.M_ae], [eom.M_ae.T, eom.M_ee]])
-    if robot.has_elastic_gears:
-        drive = -eom.h_a
-        thetadd = (tau_m - eom.h_m) / eom.Theta
-    else:
-        drive = tau_m - eom.h_a
-        thetadd = None
-    factor = jax.scipy.linalg.cho_factor(mass)
-    acceleration = jax.scipy.linalg.cho_solve(
-        factor, jnp.concatenate([drive, -eom.h_e])
-    )
-    qdd = acceleration[:n]
-    return qdd, acceleration[n:], qdd if thetadd is None else thetadd
+
+    def unbalanced(robot, state, tau_m):
+        q, eta, theta, qd, etad, thetad = state
+        links = (q, eta, qd, etad)
+        total = generalised_forces(robot, *links, acceleration[:n], acceleration[n:])
+        joint, structure = applied_forces(robot, *links)
+        if robot.has_elastic_gears:
+            drive = -robot.drives.gear_torque(q - theta, qd - thetad)
+        else:
+            rotors = robot.drives.reflected_inertia() * acceleration[:n]
+            drive = tau_m - rotors - robot.drives.motor_friction.torque(qd)
+        return jnp.concatenate([joint - drive, structure]) + total
+
+    _, missing = jax.jvp(unbalanced, primals, tangents)
+    mass = _mass(equations_of_motion(robot, *state))
+    return acceleration, -_solve(mass, missing)
+
+
+def _mass(eom: EquationsOfMotion):
+    return jnp.block([[eom.M_aa, eom.M_ae], [eom.M_ae.T, eom.M_ee]])
+
+
+def _solve(mass, force):
+    return jax.scipy.linalg.cho_solve(jax.scipy.linalg.cho_factor(mass), force)

@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._custom_types import PerElastic, PerJoint
+from .._kernel import kernel
 from .._taylor import Series, concatenate, cross, leading, product
 from ..kinematics import JointKind, MovingFrames, moving_frames
 from ._forces import applied_forces
@@ -109,6 +110,7 @@ def generalised_forces(robot: ElasticRobot, q, eta, qd, etad, qdd, etadd):
     return product("jn,j->n", robot.coupling(), forces)
 
 
+@kernel
 def inverse_dynamics(
     robot: ElasticRobot,
     q: PerJoint | Series,
@@ -155,6 +157,7 @@ def _zeros_like(q: Any, size: int) -> Any:
     return jnp.zeros((size,), q.dtype)
 
 
+@kernel
 def multibody(
     robot: ElasticRobot, q: PerJoint, eta: PerElastic, qd: PerJoint, etad: PerElastic
 ) -> tuple[Float[Array, "coordinates coordinates"], Float[Array, " coordinates"]]:

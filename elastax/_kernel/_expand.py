@@ -1,0 +1,395 @@
+"""From a jaxpr on small arrays to a graph of scalars."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from jax.extend.core import ClosedJaxpr, Literal
+
+from ._graph import Graph
+from ._moves import (
+    broadcast_in_dim,
+    dynamic_slice,
+    dynamic_update_slice,
+    gather,
+    matrices,
+    pad,
+    scatter,
+)
+
+
+class NotScalarError(Exception):
+    """The function uses something that has no scalar form here."""
+
+
+Nodes = np.ndarray  # of node indices, int64
+
+_UNROLLED_STEPS = 16  # longest loop that is written out
+
+
+def expand(closed: ClosedJaxpr, graph: Graph, arguments: Sequence[Nodes]) -> list:
+    """Nodes of the results of a jaxpr.
+
+    Args:
+        closed: the program.
+        graph: receives the operations.
+        arguments: nodes of the inputs, arrays of the inputs' shapes.
+
+    Raises:
+        NotScalarError: an operation is not known here.
+    """
+    jaxpr = closed.jaxpr
+    values: dict[Any, Nodes] = {}
+
+    def read(atom):
+        if isinstance(atom, Literal):
+            return graph.constants(np.asarray(atom.val), str(atom.aval.dtype))
+        return values[atom]
+
+    for var, constant in zip(jaxpr.constvars, closed.consts):
+        values[var] = graph.constants(np.asarray(constant), str(var.aval.dtype))
+    values.update(zip(jaxpr.invars, arguments))
+    for eqn in jaxpr.eqns:
+        if not eqn.outvars:
+            continue
+        name = eqn.primitive.name
+        rule = _RULES.get(name)
+        if rule is None:
+            raise NotScalarError(name)
+        dtypes = [str(getattr(v.aval, "dtype", "")) for v in eqn.outvars]
+        outputs = rule(graph, [read(v) for v in eqn.invars], dtypes[0], eqn.params)
+        outputs = outputs if isinstance(outputs, list) else [outputs]
+        for var, output in zip(eqn.outvars, outputs):
+            values[var] = np.asarray(output, np.int64).reshape(var.aval.shape)
+    return [read(v) for v in jaxpr.outvars]
+
+
+def _each(function: Callable, *operands: Nodes) -> Nodes:
+    """Apply a function of scalars to all elements."""
+    operands = tuple(np.broadcast_arrays(*operands))
+    columns = [x.ravel().tolist() for x in operands]
+    results = [function(*row) for row in zip(*columns)]
+    return np.array(results, np.int64).reshape(operands[0].shape)
+
+
+def _elementwise(name: str) -> Callable:
+    def rule(graph, operands, dtype, _):
+        return _each(lambda *a: graph.apply(name, *a, dtype=dtype), *operands)
+
+    return rule
+
+
+def _power(graph: Graph, node: int, exponent: int) -> int:
+    if exponent < 0:
+        one = graph.constant(1, graph.dtypes[node])
+        inverse = _power(graph, node, -exponent)
+        return graph.apply("div", one, inverse, dtype=graph.dtypes[node])
+    result, square = graph.constant(1, graph.dtypes[node]), node
+    while exponent:
+        if exponent & 1:
+            result = graph.multiply(result, square)
+        exponent >>= 1
+        if exponent:
+            square = graph.multiply(square, square)
+    return result
+
+
+def _integer_pow(graph, operands, dtype, params):
+    return _each(lambda a: _power(graph, a, params["y"]), *operands)
+
+
+def _logistic(graph, operands, dtype, _):
+    # 1/2 + tanh(x/2)/2 neither overflows nor needs a branch
+    half = graph.constant(0.5, dtype)
+
+    def one(a):
+        t = graph.apply("tanh", graph.multiply(half, a), dtype=dtype)
+        return graph.add(half, graph.multiply(half, t))
+
+    return _each(one, *operands)
+
+
+def _select_n(graph, operands, dtype, _):
+    which, *cases = operands
+    if len(cases) != 2:
+        raise NotScalarError("select_n of more than two cases")
+    return _each(
+        lambda w, no, yes: graph.apply("select", w, yes, no, dtype=dtype),
+        np.broadcast_to(which, cases[0].shape),
+        *cases,
+    )
+
+
+def _clamp(graph, operands, dtype, _):
+    low, x, high = operands
+    bounded = _each(lambda a, b: graph.apply("max", a, b, dtype=dtype), x, low)
+    return _each(lambda a, b: graph.apply("min", a, b, dtype=dtype), bounded, high)
+
+
+def _reduction(name: str) -> Callable:
+    def rule(graph, operands, dtype, params):
+        (x,) = operands
+        axes = params["axes"]
+        rest = [d for d in range(x.ndim) if d not in axes]
+        shape = [x.shape[d] for d in rest]
+        count = math.prod(x.shape[d] for d in axes)
+        rows = np.transpose(x, [*rest, *axes]).reshape(-1, count).tolist()
+
+        def reduce(row):
+            if name == "add":
+                return graph.total(row, dtype)
+            result = row[0]
+            for node in row[1:]:
+                result = graph.apply(name, result, node, dtype=dtype)
+            return result
+
+        return np.array([reduce(r) for r in rows], np.int64).reshape(shape)
+
+    return rule
+
+
+def _cumsum(graph, operands, dtype, params):
+    rows = np.moveaxis(operands[0], params["axis"], -1)
+    if params["reverse"]:
+        rows = rows[..., ::-1]
+    out = np.array(rows)
+    for k in range(1, rows.shape[-1]):
+        out[..., k] = _each(graph.add, out[..., k - 1], rows[..., k])
+    if params["reverse"]:
+        out = out[..., ::-1]
+    return np.moveaxis(out, -1, params["axis"])
+
+
+def _dot_general(graph, operands, dtype, params):
+    (lc, rc), (lb, rb) = params["dimension_numbers"]
+    a, b = operands
+    left = matrices(a, lb, lc, True)
+    right = matrices(b, rb, rc, True)
+    out = np.array(
+        [
+            [
+                [
+                    graph.total(map(graph.multiply, row, column), dtype)
+                    for column in right[k].tolist()
+                ]
+                for row in left[k].tolist()
+            ]
+            for k in range(left.shape[0])
+        ],
+        np.int64,
+    )
+    free_a = [a.shape[d] for d in range(a.ndim) if d not in lb and d not in lc]
+    free_b = [b.shape[d] for d in range(b.ndim) if d not in rb and d not in rc]
+    return out.reshape([*(a.shape[d] for d in lb), *free_a, *free_b])
+
+
+def _cholesky(graph, operands, dtype, _):
+    (matrix,) = operands
+    if matrix.ndim != 2:
+        raise NotScalarError("cholesky of a batch")
+    n = matrix.shape[0]
+    one = graph.constant(1, dtype)
+    lower = np.full((n, n), graph.constant(0, dtype), np.int64)
+
+    def less(node, products):
+        for a, b in products:
+            node = graph.apply("sub", node, graph.multiply(a, b), dtype=dtype)
+        return node
+
+    for j in range(n):
+        row = lower[j, :j].tolist()
+        pivot = less(int(matrix[j, j]), zip(row, row))
+        lower[j, j] = graph.apply("sqrt", pivot, dtype=dtype)
+        inverse = graph.apply("div", one, int(lower[j, j]), dtype=dtype)
+        for i in range(j + 1, n):
+            rest = less(int(matrix[i, j]), zip(lower[i, :j].tolist(), row))
+            lower[i, j] = graph.multiply(rest, inverse)
+    return lower
+
+
+def _triangular_solve(graph, operands, dtype, params):
+    a, b = operands
+    if a.ndim != 2 or params["conjugate_a"]:
+        raise NotScalarError("triangular_solve of a batch")
+    upside = params["transpose_a"]
+    if not params["left_side"]:  # X op(A) = B is op(A)^T X^T = B^T
+        b, upside = b.T, not upside
+    a, lower = (a.T, not params["lower"]) if upside else (a, params["lower"])
+    n = a.shape[0]
+    one = graph.constant(1, dtype)
+    x = np.array(b)
+    for i in range(n) if lower else reversed(range(n)):
+        known = range(i) if lower else range(i + 1, n)
+        for c in range(x.shape[1]):
+            rest = int(x[i, c])
+            for k in known:
+                term = graph.multiply(int(a[i, k]), int(x[k, c]))
+                rest = graph.apply("sub", rest, term, dtype=dtype)
+            if not params["unit_diagonal"]:
+                inverse = graph.apply("div", one, int(a[i, i]), dtype=dtype)
+                rest = graph.multiply(rest, inverse)
+            x[i, c] = rest
+    return x if params["left_side"] else x.T
+
+
+def _numbers(graph: Graph, nodes: Nodes) -> np.ndarray:
+    """Values of nodes that must be known while tracing."""
+    try:
+        values = [graph.values[i] for i in nodes.ravel().tolist()]
+    except KeyError:
+        raise NotScalarError("an index that depends on an argument") from None
+    return np.array(values).reshape(nodes.shape)
+
+
+def _gather(graph, operands, dtype, params):
+    x, indices = operands
+    mode, fill = str(params["mode"]), params["fill_value"]
+    if fill is None:
+        fill = 0 if dtype.startswith(("int", "bool", "uint")) else np.nan
+    return gather(
+        x,
+        _numbers(graph, indices),
+        params["dimension_numbers"],
+        params["slice_sizes"],
+        "CLIP" in mode,
+        graph.constant(fill, dtype),
+    )
+
+
+def _scatter(combine: Callable) -> Callable:
+    def rule(graph, operands, dtype, params):
+        x, indices, updates = operands
+        return scatter(
+            x,
+            _numbers(graph, indices),
+            updates,
+            params["dimension_numbers"],
+            lambda old, new: combine(graph, old, new),
+        )
+
+    return rule
+
+
+def _starts(graph, nodes):
+    return [int(_numbers(graph, i)) for i in nodes]
+
+
+def _slice(graph, operands, dtype, params):
+    strides = params["strides"] or (1,) * operands[0].ndim
+    bounds = zip(params["start_indices"], params["limit_indices"], strides)
+    return operands[0][tuple(slice(*b) for b in bounds)]
+
+
+def _iota(graph, operands, dtype, params):
+    shape, dimension = params["shape"], params["dimension"]
+    count = np.arange(shape[dimension])
+    line = [-1 if d == dimension else 1 for d in range(len(shape))]
+    return graph.constants(np.broadcast_to(count.reshape(line), shape), dtype)
+
+
+def _split(graph, operands, dtype, params):
+    cuts = np.cumsum(params["sizes"])[:-1]
+    return np.split(operands[0], cuts, axis=params["axis"])
+
+
+def _call(key: str) -> Callable:
+    def rule(graph, operands, dtype, params):
+        closed = params[key]
+        if not isinstance(closed, ClosedJaxpr):
+            closed = ClosedJaxpr(closed, ())
+        return expand(closed, graph, operands)
+
+    return rule
+
+
+def _scan(graph, operands, dtype, params):
+    length, consts, carried = (
+        params["length"],
+        params["num_consts"],
+        params["num_carry"],
+    )
+    if length > _UNROLLED_STEPS:
+        raise NotScalarError("a long loop")
+    fixed, state = operands[:consts], operands[consts : consts + carried]
+    series = operands[consts + carried :]
+    rows: list[Any] = [None] * length
+    order = reversed(range(length)) if params["reverse"] else range(length)
+    for k in order:
+        outputs = expand(
+            params["jaxpr"], graph, [*fixed, *state, *(x[k] for x in series)]
+        )
+        state, rows[k] = outputs[:carried], outputs[carried:]
+    return [*state, *(np.stack(column) for column in zip(*rows))]
+
+
+def _program(graph, operands, dtype, params):
+    if params["levels"]:
+        raise NotScalarError("a batched kernel inside a kernel")
+    return expand(params["program"].closed, graph, operands)
+
+
+_RULES: dict[str, Callable] = {
+    name: _elementwise(name)
+    for name in (
+        "add sub mul div rem neg max min pow atan2 sin cos tan exp expm1 log log1p sqrt "
+        "rsqrt cbrt tanh abs sign floor ceil is_finite lt le gt ge eq ne and or xor not"
+    ).split()
+}
+_RULES |= {
+    "add_any": _elementwise("add"),
+    "square": lambda g, ops, dtype, p: _each(lambda a: g.multiply(a, a), *ops),
+    "integer_pow": _integer_pow,
+    "logistic": _logistic,
+    "select_n": _select_n,
+    "clamp": _clamp,
+    "convert_element_type": _elementwise("convert"),
+    "reduce_sum": _reduction("add"),
+    "reduce_max": _reduction("max"),
+    "reduce_min": _reduction("min"),
+    "reduce_prod": _reduction("mul"),
+    "reduce_and": _reduction("and"),
+    "reduce_or": _reduction("or"),
+    "cumsum": _cumsum,
+    "dot_general": _dot_general,
+    "cholesky": _cholesky,
+    "triangular_solve": _triangular_solve,
+    "gather": _gather,
+    "scatter": _scatter(lambda g, old, new: new),
+    "scatter-add": _scatter(lambda g, old, new: g.add(old, new)),
+    "scatter-mul": _scatter(lambda g, old, new: g.multiply(old, new)),
+    "dynamic_slice": lambda g, ops, dtype, p: dynamic_slice(
+        ops[0], _starts(g, ops[1:]), p["slice_sizes"]
+    ),
+    "dynamic_update_slice": lambda g, ops, dtype, p: dynamic_update_slice(
+        ops[0], ops[1], _starts(g, ops[2:])
+    ),
+    "slice": _slice,
+    "iota": _iota,
+    "split": _split,
+    "pad": lambda g, ops, dtype, p: pad(ops[0], int(ops[1]), p["padding_config"]),
+    "broadcast_in_dim": lambda g, ops, dtype, p: broadcast_in_dim(
+        ops[0], p["shape"], p["broadcast_dimensions"]
+    ),
+    "reshape": lambda g, ops, dtype, p: ops[0],  # `expand` gives the new shape
+    "squeeze": lambda g, ops, dtype, p: ops[0],
+    "expand_dims": lambda g, ops, dtype, p: ops[0],
+    "copy": lambda g, ops, dtype, p: ops[0],
+    "copy_p": lambda g, ops, dtype, p: ops[0],
+    "optimization_barrier": lambda g, ops, dtype, p: list(ops),
+    "transpose": lambda g, ops, dtype, p: np.transpose(ops[0], p["permutation"]),
+    "rev": lambda g, ops, dtype, p: np.flip(ops[0], p["dimensions"]),
+    "concatenate": lambda g, ops, dtype, p: np.concatenate(ops, p["dimension"]),
+    "stack": lambda g, ops, dtype, p: np.stack(ops, p["axis"]),
+    "tile": lambda g, ops, dtype, p: np.tile(ops[0], p["reps"]),
+    "jit": _call("jaxpr"),
+    "pjit": _call("jaxpr"),
+    "closed_call": _call("call_jaxpr"),
+    "core_call": _call("call_jaxpr"),
+    "remat": _call("jaxpr"),
+    "checkpoint": _call("jaxpr"),
+    "custom_jvp_call": _call("call_jaxpr"),
+    "custom_vjp_call": _call("call_jaxpr"),
+    "scan": _scan,
+    "elastax_kernel": _program,
+}

@@ -1,0 +1,118 @@
+"""The JAX primitive of kernels: batching, derivatives, evaluation.
+
+A kernel is bound to a program and to the sizes of its batch axes, outermost first. Each
+operand carries all of these axes in front, with length one where it is not batched.
+"""
+
+import functools
+
+import jax
+import jax.numpy as jnp
+from jax.extend.core import Primitive
+from jax.interpreters import ad, batching, mlir
+
+from ._emit import emit_kernel, kernels_supported
+from ._expand import NotScalarError
+from ._program import Program
+
+
+kernel_p = Primitive("elastax_kernel")
+kernel_p.multiple_results = True
+
+
+def _abstract(*operands, program: Program, levels: tuple[int, ...]):
+    return [jax.core.ShapedArray(levels + a.shape, a.dtype) for a in program.outputs]
+
+
+def _written_out(*operands, program: Program, levels: tuple[int, ...]):
+    """The program as it is written, vectorised over the batch."""
+    if not levels:
+        return program(*operands)
+    size, inner = levels[0], levels[1:]
+    mapped = [x.shape[0] == size for x in operands]
+    function = lambda *xs: _written_out(*xs, program=program, levels=inner)
+    return jax.vmap(function, in_axes=tuple(0 if m else None for m in mapped))(
+        *(x if m else x[0] for x, m in zip(operands, mapped))
+    )
+
+
+@functools.cache
+def _compiled(program: Program, levels: tuple[int, ...]):
+    return jax.jit(lambda *xs: kernel_p.bind(*xs, program=program, levels=levels))
+
+
+def _evaluate(*operands, program, levels):
+    return _compiled(program, levels)(*operands)
+
+
+def _batch(operands, axes, *, program, levels):
+    size = next(x.shape[axis] for x, axis in zip(operands, axes) if axis is not None)
+    moved = [
+        jnp.expand_dims(x, 0) if axis is None else jnp.moveaxis(x, axis, 0)
+        for x, axis in zip(operands, axes)
+    ]
+    outputs = kernel_p.bind(*moved, program=program, levels=(size, *levels))
+    return outputs, [0] * len(outputs)
+
+
+def _zeros_of(x):
+    return type(x) is ad.Zero
+
+
+def _push(primals, tangents, *, program, levels):
+    outputs = kernel_p.bind(*primals, program=program, levels=levels)
+    moving = tuple(not _zeros_of(t) for t in tangents)
+    moved = [t for t in tangents if not _zeros_of(t)]
+    derived = program.tangent(moving)
+    arguments = derived.select([*primals, *moved])
+    if not arguments:
+        return outputs, [ad.Zero(jax.core.get_aval(x)) for x in outputs]
+    pushed = kernel_p.bind(*arguments, program=derived.program, levels=levels)
+    return outputs, pushed
+
+
+def _pull(cotangents, *operands, program, levels):
+    linear = tuple(ad.is_undefined_primal(x) for x in operands)
+    fixed = [x for x, yes in zip(operands, linear) if not yes]
+    back = [
+        jnp.zeros(ct.aval.shape, ct.aval.dtype) if _zeros_of(ct) else ct
+        for ct in cotangents
+    ]
+    derived = program.transposed(linear)
+    arguments = derived.select([*fixed, *back])
+    pulled = iter(kernel_p.bind(*arguments, program=derived.program, levels=levels))
+    results = []
+    for x, yes in zip(operands, linear):
+        if not yes:
+            results.append(None)
+            continue
+        cotangent = next(pulled)
+        shared = tuple(
+            k for k, size in enumerate(levels) if x.aval.shape[k] == 1 and size != 1
+        )
+        if shared:
+            cotangent = jnp.sum(cotangent, axis=shared, keepdims=True)
+        results.append(cotangent)
+    return results
+
+
+_lower_written_out = mlir.lower_fun(_written_out, multiple_results=True)
+
+
+def _lower_on_cpu(ctx, *operands, program, levels):
+    exported = ctx.module_context.lowering_parameters.for_export
+    if kernels_supported() and not exported:
+        try:
+            return emit_kernel(ctx, operands, program, levels)
+        except NotScalarError:
+            pass
+    return _lower_written_out(ctx, *operands, program=program, levels=levels)
+
+
+kernel_p.def_abstract_eval(_abstract)
+kernel_p.def_impl(_evaluate)
+batching.primitive_batchers[kernel_p] = _batch
+ad.primitive_jvps[kernel_p] = _push
+ad.primitive_transposes[kernel_p] = _pull
+mlir.register_lowering(kernel_p, _lower_written_out)
+mlir.register_lowering(kernel_p, _lower_on_cpu, platform="cpu")
