@@ -21,6 +21,7 @@ _NAMES = {
     "kr16": "robots",
     "kr210": "robots",
     "kr300": "robots",
+    "over_devices": "_devices",
     "run_feedforward": "control",
     "simulate": "dynamics",
 }

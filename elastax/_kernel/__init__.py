@@ -10,6 +10,6 @@ makes it behave under `jit`, `vmap`, `jvp`, `grad` and inside loops. Elsewhere (
 export, untested versions of jaxlib) the definition runs as it is written.
 """
 
-from ._decorator import kernel as kernel
+from ._decorator import kernel as kernel, written_out as written_out
 from ._emit import kernels_supported as kernels_supported
 from ._expand import NotScalarError as NotScalarError

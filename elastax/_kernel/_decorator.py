@@ -1,5 +1,7 @@
 """The decorator that turns a function of small arrays into a kernel."""
 
+import contextlib
+import contextvars
 import functools
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
@@ -10,6 +12,19 @@ import numpy as np
 
 from ._primitive import kernel_p
 from ._program import Program, trace
+
+
+_ENABLED = contextvars.ContextVar("elastax_kernels", default=True)
+
+
+@contextlib.contextmanager
+def written_out():
+    """Trace functions under `kernel` as they are written, the reference route."""
+    token = _ENABLED.set(False)
+    try:
+        yield
+    finally:
+        _ENABLED.reset(token)
 
 
 Function = TypeVar("Function", bound=Callable)
@@ -59,6 +74,8 @@ def kernel(function: Function) -> Function:
 
     @functools.wraps(function)
     def wrapper(*args, **kwargs):
+        if not _ENABLED.get():
+            return function(*args, **kwargs)
         leaves, treedef = jax.tree.flatten((args, kwargs))
         numeric = tuple(_is_number(x) for x in leaves)
         leaves = [jnp.asarray(x) if n else x for n, x in zip(numeric, leaves)]

@@ -148,8 +148,29 @@ class _Kernel:
     def _place_of(self, node: int) -> tuple[int, int]:
         return self.where[self.graph.operands[node][0]]
 
-    def operand_shape(self, k: int) -> tuple[int, int]:
-        return math.prod(self.shapes[k]), self.sizes[k]
+    def operand_types(self) -> list[Any]:
+        """Rows for one sample; for a batch one vector with all operands in it.
+
+        XLA cannot hand a large constant to a loop in here and would abort: a vector of
+        all operands is constant only if all of them are.
+        """
+        if not self.axes:
+            return [_tensor((1, self.sizes[k]), self.dtype) for k in self.used]
+        return [_tensor((sum(self._lengths()),), self.dtype)] if self.used else []
+
+    def _lengths(self) -> list[int]:
+        return [math.prod(self.shapes[k]) * self.sizes[k] for k in self.used]
+
+    def gather(self, operands: Sequence[Any]) -> list[Any]:
+        """The kernel's operands from those of the primitive."""
+        if not self.axes:
+            kinds = self.operand_types()
+            return [hlo.reshape(t, operands[k]) for t, k in zip(kinds, self.used)]
+        flat = [
+            hlo.reshape(_tensor((length,), self.dtype), operands[k])
+            for length, k in zip(self._lengths(), self.used)
+        ]
+        return [_joined(flat)] if flat else []
 
     def result_shape(self) -> tuple[int, int]:
         return math.prod(self.levels), len(self.results)
@@ -166,15 +187,21 @@ class _Kernel:
         if not self.axes:
             return _call(sample, list(operands))
         whole = _literal(0, self.result_shape(), self.dtype)
-        return self._loop(sample, list(operands), [], whole)
+        starts = dict(zip(self.used, np.cumsum([0, *self._lengths()]).tolist()))
+        fixed = [k for k in self.used if math.prod(self.shapes[k]) == 1]
+        kept = [self._row(k, operands[0], starts[k], []) for k in fixed]
+        self._rows = lambda vector, kept, counters: [
+            kept[fixed.index(k)]
+            if k in fixed
+            else self._row(k, vector, starts[k], counters)
+            for k in self.used
+        ]
+        return self._loop(sample, [*operands, *kept], [], whole)
 
     def _loop(self, sample, operands, counters, whole):
         """The loops that are still to come, and the sample inside."""
         if len(counters) == len(self.axes):
-            rows = [
-                self._row(k, operand, counters)
-                for k, operand in zip(self.used, operands)
-            ]
+            rows = self._rows(operands[0], operands[1:], counters) if operands else []
             place = self._place(self.levels, counters)
             return hlo.dynamic_update_slice(whole, _call(sample, rows), place)
         carried = [_literal(0, (), "int64"), whole, *counters, *operands]
@@ -202,11 +229,14 @@ class _Kernel:
                 place = hlo.add(scaled, counters[self.axes.index(level)])
         return [place, zero]
 
-    def _row(self, k, operand, counters):
-        if self.operand_shape(k)[0] == 1:
-            return operand
-        place = self._place(self.shapes[k], counters)
-        return hlo.dynamic_slice(operand, place, _dims(1, self.sizes[k]))
+    def _row(self, k, vector, start, counters):
+        """Row (1, size) of an operand from the vector of all operands."""
+        size = self.sizes[k]
+        place, _ = self._place(self.shapes[k], counters)
+        place = hlo.multiply(place, _literal(size, (), "int64"))
+        place = hlo.add(place, _literal(start, (), "int64"))
+        part = hlo.dynamic_slice(vector, [place], _dims(size))
+        return hlo.reshape(_tensor((1, size), self.dtype), part)
 
     def _column(self, rows: dict[int, Any]) -> Any:
         """Results of one sample, (results, 1), from the rows of its operands."""
@@ -214,6 +244,12 @@ class _Kernel:
         # what is only passed on does not go through the fusion: XLA would abort
         made = [n for n, value in values.items() if value is None]
         if made:
+            read = {
+                self._place_of(n)[0]
+                for n in self.graph.needed(made)
+                if self.graph.names[n] == "input"
+            }
+            rows = {k: row for k, row in rows.items() if k in read}
             inputs = list(rows.values())
             fusion = mhlo.FusionOp(
                 [_tensor((1, 1), self.dtype)] * len(made),
@@ -260,6 +296,13 @@ class _Kernel:
         return None
 
 
+def _joined(parts: list[Any]) -> Any:
+    """Concatenation along the first axis."""
+    if len(parts) == 1:
+        return parts[0]
+    return hlo.concatenate(parts, ir.IntegerAttr.get(_ELEMENT_TYPES["int64"](), 0))
+
+
 def _call(function: Any, operands: list[Any], extra: dict[str, str] = {}) -> Any:
     """Call that XLA keeps; the function has one result."""
     call = func.CallOp(
@@ -284,18 +327,14 @@ def emit_kernel(
     """
     program.scalars  # raises before anything is emitted
     shapes = [a.shape[: len(levels)] for a in ctx.avals_in]
-    kernel_function, used = _function(ctx, program, levels, tuple(shapes))
-    flat = []
-    for k in used:
-        aval = program.inputs[k]
-        rows = (math.prod(shapes[k]), math.prod(aval.shape))
-        flat.append(hlo.reshape(_tensor(rows, str(aval.dtype)), operands[k]))
-    results = _call(kernel_function, flat, {"xla_cpu_small_call": "true"})
+    kernel, function = _function(ctx, program, levels, tuple(shapes))
+    gathered = kernel.gather(operands)
+    results = _call(function, gathered, {"xla_cpu_small_call": "true"})
     return _split(results, program, levels)
 
 
 def _function(ctx, program, levels, shapes):
-    """The kernel's function in this module, made once, and the operands it takes."""
+    """The kernel and its function in this module, made once."""
     cache = ctx.module_context.cached_primitive_lowerings
     key = ("elastax_kernel", program, levels, shapes)
     if key in cache:
@@ -311,12 +350,12 @@ def _function(ctx, program, levels, shapes):
         return function
 
     kernel = _Kernel(program, levels, shapes, add_function)
-    inputs = [_tensor(kernel.operand_shape(k), kernel.dtype) for k in kernel.used]
+    inputs = kernel.operand_types()
     output = _tensor(kernel.result_shape(), kernel.dtype)
     function = add_function("kernel", ir.FunctionType.get(inputs, [output]))
     with ir.InsertionPoint(function.add_entry_block()):
         func.ReturnOp([kernel.emit(function.arguments)])
-    cache[key] = function, kernel.used
+    cache[key] = kernel, function
     return cache[key]
 
 

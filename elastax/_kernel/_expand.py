@@ -332,8 +332,9 @@ def _program(graph, operands, dtype, params):
 _RULES: dict[str, Callable] = {
     name: _elementwise(name)
     for name in (
-        "add sub mul div rem neg max min pow atan2 sin cos tan exp expm1 log log1p sqrt "
-        "rsqrt cbrt tanh abs sign floor ceil is_finite lt le gt ge eq ne and or xor not"
+        "add sub mul div rem neg max min pow atan2 sin cos tan exp expm1 log log1p "
+        "sqrt rsqrt cbrt tanh abs sign floor ceil is_finite "
+        "lt le gt ge eq ne and or xor not"
     ).split()
 }
 _RULES |= {

@@ -106,7 +106,7 @@ def dynamic_update_slice(x: np.ndarray, update: np.ndarray, starts: Any) -> np.n
 
 
 def matrices(x: np.ndarray, batch: Any, contract: Any, rows_first: bool) -> np.ndarray:
-    """Operand of a product as (batch, rows, contracted) or (batch, contracted, rows)."""
+    """Operand of a product as (batch, rows, contracted), or the last two swapped."""
     free = [d for d in range(x.ndim) if d not in batch and d not in contract]
     shape = [math.prod(x.shape[d] for d in dims) for dims in (batch, free, contract)]
     y = np.transpose(x, [*batch, *free, *contract]).reshape(shape)

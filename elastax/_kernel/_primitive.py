@@ -101,7 +101,8 @@ _lower_written_out = mlir.lower_fun(_written_out, multiple_results=True)
 
 def _lower_on_cpu(ctx, *operands, program, levels):
     exported = ctx.module_context.lowering_parameters.for_export
-    if kernels_supported() and not exported:
+    empty = not any(a.size for a in program.outputs)
+    if kernels_supported() and not exported and not empty:
         try:
             return emit_kernel(ctx, operands, program, levels)
         except NotScalarError:

@@ -76,7 +76,7 @@ class Program:
         return self._tangents[moving]
 
     def transposed(self, linear: tuple[bool, ...]) -> "Derived":
-        """Program of (other inputs, output cotangents) to the linear ones' cotangents."""
+        """Program of (other inputs, cotangents) to the linear inputs' cotangents."""
         if linear not in self._transposed:
             others = [a for a, yes in zip(self.inputs, linear) if not yes]
             moved = [a for a, yes in zip(self.inputs, linear) if yes]

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from .._devices import over_devices
 from ..control import CascadeMotorControl, run_feedforward
 from ..dynamics import ElasticRobot
 from ..inverse import AbstractInverse
@@ -70,7 +71,7 @@ def run_grid(
     inverses: dict[str, AbstractInverse],
     progress: Progress,
 ) -> Grid:
-    """Every inverse over the grid, one vmapped call each.
+    """Every inverse over the grid, one call each, split over the cores.
 
     Raises:
         ValueError: the robot has fewer than three axes.
@@ -104,7 +105,7 @@ def run_grid(
     criterion, integral = {}, {}
     for name, inverse in inverses.items():
         progress.say(f"{name} over {len(flat)} motions of {duration:g} s ...")
-        program = jax.jit(jax.vmap(case, in_axes=(None, None, 0, 0)))
+        program = jax.jit(over_devices(case, in_axes=(None, None, 0, 0)))
         c, e = program(robot, inverse, start, move)
         criterion[name] = np.asarray(c).reshape(len(MOVES), -1)
         integral[name] = np.asarray(e).reshape(len(MOVES), -1)

@@ -35,8 +35,12 @@ def runs_table(robot: ElasticRobot, result: dict) -> str:
             f"at the gears {gears} N m"
         )
         if "step_median_s" in figures:
-            median, p99 = (1e6 * figures[k] for k in ("step_median_s", "step_p99_s"))
-            lines.append(f"  streamed: median {median:.0f} us a step, p99 {p99:.0f} us")
+            names = ("step_median_s", "step_p99_s", "step_p999_s")
+            p50, p99, p999 = (1e6 * figures[k] for k in names)
+            lines.append(
+                f"  streamed: median {p50:.0f} us a step, p99 {p99:.0f} us, "
+                f"p99.9 {p999:.0f} us"
+            )
     return "\n".join(lines)
 
 

@@ -6,6 +6,7 @@ from ._block_form import (
     forward_dynamics as forward_dynamics,
 )
 from ._bodies import RigidBodies as RigidBodies, no_bodies as no_bodies
+from ._closed_loop import AbstractMotorController as AbstractMotorController
 from ._command import (
     CommandInterpolant as CommandInterpolant,
     MotorCommand as MotorCommand,
@@ -46,9 +47,8 @@ from ._robot import (
     SlopeRole as SlopeRole,
 )
 from ._simulate import (
-    AbstractMotorController as AbstractMotorController,
     SimulationResult as SimulationResult,
     resting_state as resting_state,
     simulate as simulate,
-    tool_state as tool_state,
 )
+from ._tool_state import tool_state as tool_state

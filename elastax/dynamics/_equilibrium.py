@@ -4,11 +4,21 @@ import jax
 import jax.numpy as jnp
 
 from .._custom_types import PerElastic, PerJoint
+from .._kernel import kernel
 from ._newton_euler import inverse_dynamics
 from ._robot import ElasticRobot
 
 
 _STEPS = 12  # Newton steps; the springs are nearly linear, four reach rounding
+
+
+@kernel
+def static_load(
+    robot: ElasticRobot, q: PerJoint, eta: PerElastic
+) -> tuple[PerJoint, PerElastic]:
+    """`inverse_dynamics` at rest; the terms with speeds are not even formed."""
+    still, rest = jnp.zeros_like(q), jnp.zeros_like(eta)
+    return inverse_dynamics(robot, q, still, still, eta, rest, rest)
 
 
 def static_equilibrium(
@@ -32,7 +42,7 @@ def static_equilibrium(
 
     def residual(x):
         q, eta = x[:n], x[n:]
-        joint, structure = inverse_dynamics(robot, q, zero, zero, eta, rest, rest)
+        joint, structure = static_load(robot, q, eta)
         if robot.has_elastic_gears:
             joint = joint + robot.drives.gear_torque(q - theta, zero)
         else:

@@ -21,6 +21,13 @@ from ._damping_signal import (
     FrozenDamping as FrozenDamping,
 )
 from ._drive import DriveState as DriveState, motor_motion as motor_motion
+from ._export import export_step as export_step
 from ._flexible_joint import FlexibleJointInverse as FlexibleJointInverse
 from ._response import advance as advance, response as response
 from ._rigid import RigidInverse as RigidInverse
+from ._stream import (
+    Latency as Latency,
+    StreamedInverse as StreamedInverse,
+    compile_step as compile_step,
+    latency as latency,
+)

@@ -21,6 +21,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._custom_types import PerElastic, Scalar
+from .._kernel import kernel
 from .._taylor import Series, from_derivatives, leading
 from ..dynamics import ElasticRobot, MotorCommand, MotorSample, inverse_dynamics
 from ..kinematics import CorrectionLimiter, SigmoidDamping, moving_frames
@@ -137,34 +138,44 @@ class ASIM(AbstractInverse):
 
     def _smallest(self, model: ElasticRobot, q, eta) -> Scalar:
         """Smallest singular value of the deformed robot's Jacobian."""
-        jacobian, _ = self.correction.linearised(
-            model, q, eta, correction_target(model, q)
-        )
-        return self.correction.smallest(jacobian)
+        return self.correction.smallest(_jacobian(self.correction, model, q, eta))
 
     def _loaded(self, model: ElasticRobot, sample, forcing, eta, factor):
-        """Corrected joint angles (order 3) and torques behind the gears (order 1)."""
-        reference = from_derivatives(sample[:5]).truncated(3)
-        deformation = deformation_series(model, eta, forcing)
-        q = reference + correct(
-            self.correction,
+        return _loaded_motion(
+            (self.correction, self.limiter, self.iterations),
             model,
-            reference,
-            deformation,
+            sample,
+            forcing,
+            eta,
             factor,
-            self.limiter,
-            self.iterations,
         )
-        motion = (q.truncated(1), q.rate().truncated(1), q.rate().rate())
-        bending = (
-            deformation.truncated(1),
-            deformation.rate().truncated(1),
-            deformation.rate().rate(),
-        )
-        load, _ = inverse_dynamics(model, *motion, *bending)  # [Reiner2010] (3.91)
-        return q, load
 
 
+@kernel
+def _jacobian(correction: AbstractCorrection, model: ElasticRobot, q, eta):
+    return correction.linearised(model, q, eta, correction_target(model, q))[0]
+
+
+@kernel
+def _loaded_motion(how, model: ElasticRobot, sample, forcing, eta, factor):
+    """Corrected joint angles (order 3) and torques behind the gears (order 1)."""
+    correction, limiter, iterations = how
+    reference = from_derivatives(sample[:5]).truncated(3)
+    deformation = deformation_series(model, eta, forcing)
+    q = reference + correct(
+        correction, model, reference, deformation, factor, limiter, iterations
+    )
+    motion = (q.truncated(1), q.rate().truncated(1), q.rate().rate())
+    bending = (
+        deformation.truncated(1),
+        deformation.rate().truncated(1),
+        deformation.rate().rate(),
+    )
+    load, _ = inverse_dynamics(model, *motion, *bending)  # [Reiner2010] (3.91)
+    return q, load
+
+
+@kernel
 def structure_torque(model: ElasticRobot, sample: Derivatives) -> Series:
     r"""Torques in the structure of the rigid parallel model, with two derivatives.
 
@@ -194,6 +205,7 @@ def resting_deformation(model: ElasticRobot, forcing: Series) -> PerElastic:
     return model.structure_stiffness.torsion(forcing.coefficients[0])
 
 
+@kernel
 def advance_deformation(
     model: ElasticRobot,
     eta: PerElastic,

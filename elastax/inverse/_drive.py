@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._custom_types import PerJoint, Scalar
+from .._kernel import kernel
 from .._taylor import Series
 from ..drivetrain import AbstractStiffness, DriveTrain
 from ..dynamics import MotorSample
@@ -40,6 +41,7 @@ def resting_torsion(drives: DriveTrain, load: Series) -> PerJoint:
     return gear_spring(drives).torsion(-load.coefficients[0])
 
 
+@kernel
 def advance_torsion(
     drives: DriveTrain,
     torsion: PerJoint,
@@ -77,6 +79,7 @@ def torsions_along(
     return jnp.concatenate([start[None], rest])
 
 
+@kernel
 def motor_motion(
     drives: DriveTrain, q: Series, load: Series, torsion: PerJoint, eta
 ) -> MotorSample:

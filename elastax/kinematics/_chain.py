@@ -7,6 +7,7 @@ from jaxtyping import Array, Float
 
 from .._checks import check_fields
 from .._custom_types import PerJoint, Transform, as_real
+from .._kernel import kernel
 from .._taylor import (
     Series,
     concatenate,
@@ -168,6 +169,7 @@ def moving_frames(chain: SerialChain, q: PerJoint | Series) -> MovingFrames:
     return MovingFrames(rotation, position, axis, tool_rotation, tool_position)
 
 
+@kernel
 def forward_kinematics(chain: SerialChain, q: PerJoint) -> Transform:
     """Pose of the tool in the base frame [m].
 
@@ -185,6 +187,7 @@ def forward_kinematics(chain: SerialChain, q: PerJoint) -> Transform:
     return transform(leading(frames.tool_rotation), leading(frames.tool_position))
 
 
+@kernel
 def link_poses(chain: SerialChain, q: PerJoint) -> Float[Array, "joints 4 4"]:
     """Pose of every link's frame in the base frame [m], shape (joints, 4, 4).
 

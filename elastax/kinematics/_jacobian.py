@@ -6,11 +6,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._custom_types import PerJoint
+from .._kernel import kernel
 from .._taylor import concatenate, cross, from_derivatives, leading, product
 from ._chain import MovingFrames, SerialChain, moving_frames
 from ._joints import JointKind
 
 
+@kernel
 def jacobian(chain: SerialChain, q: PerJoint) -> Float[Array, "6 joints"]:
     """Geometric Jacobian of the tool in the base frame, translation above rotation.
 
@@ -41,6 +43,7 @@ def tool_jacobian(chain: SerialChain, frames: MovingFrames):
     return product("ij,kj->ik", jnp.asarray(np.eye(6), rotary.dtype), columns)
 
 
+@kernel
 def jacobian_derivatives(
     chain: SerialChain, q_derivatives: Float[Array, "terms joints"]
 ) -> Float[Array, "terms 6 joints"]:
@@ -58,6 +61,7 @@ def jacobian_derivatives(
     return tool_jacobian(chain, frames).derivatives()
 
 
+@kernel
 def tool_motion(
     chain: SerialChain, q: PerJoint, qd: PerJoint, qdd: PerJoint
 ) -> tuple[Float[Array, "6"], Float[Array, "6"]]:

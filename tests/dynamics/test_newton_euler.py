@@ -168,20 +168,10 @@ def test_speeds_near_zero_and_large():
 def peer():
     """The KR210 with all its joints in Pinocchio: library, robot, model, data."""
     pin = pytest.importorskip("pinocchio")
+    from benchmarks.peers.pinocchio import robot_model
+
     robot = kr210()
-    frames = jax.device_get(robot.chain.joints.frames())
-    bodies = jax.device_get(robot.all_bodies())
-    model = pin.Model()
-    model.gravity.linear = np.asarray(robot.gravity)
-    pose, parent = np.asarray(robot.chain.base), 0
-    for k, axis in enumerate(frames.axis):
-        pose = pose @ frames.before[k]
-        joint = pin.JointModelRevoluteUnaligned(*axis)
-        parent = model.addJoint(parent, joint, pin.SE3(pose), f"joint {k}")
-        for i in np.flatnonzero(np.array(bodies.joint) == k):
-            inertia = pin.Inertia(bodies.mass[i], bodies.com[i], bodies.inertia[i])
-            model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
-        pose = frames.after[k]
+    model = robot_model(robot)
     return pin, robot, model, model.createData()
 
 

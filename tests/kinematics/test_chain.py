@@ -107,22 +107,10 @@ def test_prismatic_closed_form():
 @pytest.mark.parametrize("chain", [mixed(), kuka()], ids=["mixed", "kuka"])
 def test_pinocchio_agrees(chain):
     pin = pytest.importorskip("pinocchio", reason="Pinocchio (`pin`) is not installed")
-    frames = chain.joints.frames()
-    model, parent = pin.Model(), 0
-    base = pin.SE3(np.asarray(chain.base))
-    for k, kind in enumerate(chain.kinds):
-        axis = np.array(frames.axis[k])
-        turns = kind is JointKind.REVOLUTE
-        joint = (
-            pin.JointModelRevoluteUnaligned(axis)
-            if turns
-            else pin.JointModelPrismaticUnaligned(axis)
-        )
-        placement = pin.SE3(np.asarray(frames.before[k]))
-        placement = base * placement if k == 0 else placement
-        parent = model.addJoint(parent, joint, placement, f"joint{k}")
-    tool = pin.SE3(np.asarray(frames.after[-1] @ chain.tool))
-    frame = model.addFrame(pin.Frame("tool", parent, tool, pin.FrameType.OP_FRAME))
+    from benchmarks.peers.pinocchio import TOOL, chain_model
+
+    model = chain_model(chain)
+    frame = model.getFrameId(TOOL)
     data = model.createData()
     q, qd, qdd = np.random.default_rng(7).uniform(-1, 1, (3, chain.number))
     pin.forwardKinematics(model, data, q, qd, qdd)
