@@ -2,15 +2,19 @@
 # make test    the fast tests
 # make slow    the slow tests
 # make lint    ruff and pyright
-# make clean   remove the environment and the caches
+# make bench   the benchmarks in an environment with their peers, some 25 minutes;
+#              BENCH_ARGS="asim --quick" for some of them or for rough figures
+# make clean   remove the environments and the caches
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 # two processes; the tests of one file stay together and share what they compile
 PYTEST_ARGS ?= -n 2 --dist loadfile
+BENCH_VENV := .venv-bench
+BENCH_ARGS ?=
 
-.PHONY: demo test slow lint clean
+.PHONY: demo test slow lint bench clean
 
 demo: $(VENV)/.core
 	$(BIN)/elastax feedforward --out out/demo
@@ -30,8 +34,11 @@ lint: $(VENV)/.test
 	@echo "pyright elastax ..."
 	@$(BIN)/pyright --pythonpath $(BIN)/python elastax
 
+bench: $(BENCH_VENV)/.bench
+	$(BENCH_VENV)/bin/python -m benchmarks $(BENCH_ARGS)
+
 clean:
-	rm -rf $(VENV) .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(BENCH_VENV) .pytest_cache .ruff_cache .hypothesis
 
 # The stamps are newer than what they were made from: a second run installs nothing.
 $(VENV)/.created:
@@ -49,4 +56,14 @@ $(VENV)/.core: pyproject.toml | $(VENV)/.created
 $(VENV)/.test: $(VENV)/.core
 	@echo "installing the test tools into $(VENV) ..."
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test]'
+	@touch $@
+
+$(BENCH_VENV)/.bench: pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	    { echo "Python 3.11 or newer is needed: make PYTHON=python3.11 ..."; exit 1; }
+	@echo "installing elastax and its peers into $(BENCH_VENV) (a few minutes) ..."
+	@$(PYTHON) -m venv $(BENCH_VENV)
+	@echo '*' > $(BENCH_VENV)/.gitignore
+	@$(BENCH_VENV)/bin/python -m pip install --quiet --disable-pip-version-check \
+	    -e '.[bench]'
 	@touch $@

@@ -1,0 +1,1 @@
+"""Benchmarks against peers, one question per file: `python -m benchmarks`."""

@@ -1,0 +1,1 @@
+"""Robots of elastax in other packages; each module needs its package installed."""
