@@ -12,4 +12,4 @@ export, untested versions of jaxlib) the definition runs as it is written.
 
 from ._decorator import kernel as kernel, written_out as written_out
 from ._emit import kernels_supported as kernels_supported
-from ._expand import NotScalarError as NotScalarError
+from ._graph import NotScalarError as NotScalarError

@@ -19,7 +19,10 @@ _ENABLED = contextvars.ContextVar("elastax_kernels", default=True)
 
 @contextlib.contextmanager
 def written_out():
-    """Trace functions under `kernel` as they are written, the reference route."""
+    """Trace functions under `kernel` as they are written, the reference route.
+
+    What `jax.jit` has traced before stays as it was traced.
+    """
     token = _ENABLED.set(False)
     try:
         yield
@@ -36,6 +39,11 @@ def _is_number(leaf: Any) -> bool:
     if dtype is None:
         return isinstance(leaf, float)
     return jnp.issubdtype(dtype, np.floating)
+
+
+def _varies(leaf: Any) -> bool:
+    """Whether it differs, as far as JAX keeps account, between devices."""
+    return bool(jax.typeof(leaf).manual_axis_type.varying)
 
 
 def _is_constant(leaf: Any) -> bool:
@@ -65,7 +73,8 @@ def kernel(function: Function) -> Function:
             return outputs
 
         numbers = [x for n, x in zip(numeric, leaves) if n]
-        program = trace(flat, numbers, function.__name__)
+        name = getattr(function, "__name__", "function")
+        program = trace(flat, numbers, name)
         dtype = numbers[0].dtype
         plain = program.closed.effects or not program.outputs
         if plain or any(a.dtype != dtype for a in program.outputs):
@@ -80,15 +89,17 @@ def kernel(function: Function) -> Function:
         numeric = tuple(_is_number(x) for x in leaves)
         leaves = [jnp.asarray(x) if n else x for n, x in zip(numeric, leaves)]
         numbers = [x for n, x in zip(numeric, leaves) if n]
-        constants = tuple(x for n, x in zip(numeric, leaves) if not n)
+        constants = [x for n, x in zip(numeric, leaves) if not n]
         if (
             not numbers
-            or any(x.dtype != numbers[0].dtype for x in numbers)
+            or any(x.dtype != numbers[0].dtype or _varies(x) for x in numbers)
             or not all(map(_is_constant, constants))
         ):
             return function(*args, **kwargs)
         shapes = tuple(x.shape for x in numbers)
-        key = (treedef, numeric, constants, shapes, numbers[0].dtype)
+        kinds = (numeric, numbers[0].dtype, jax.dtypes.canonicalize_dtype(float))
+        # with the types, as True == 1
+        key = (treedef, kinds, tuple((type(x), x) for x in constants), shapes)
         if key not in programs:
             programs[key] = traced(treedef, numeric, leaves)
         found = programs[key]

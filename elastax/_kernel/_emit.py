@@ -16,15 +16,20 @@ import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import jaxlib
+import jaxlib.version
 import numpy as np
 from jaxlib.mlir import ir
 from jaxlib.mlir.dialects import func, mhlo, stablehlo as hlo
 
+from ._graph import NotScalarError
 from ._program import Program
 
 
 _TESTED = ((0, 10, 2), (0, 11, 0))  # first jaxlib, and the first that is not tested
+
+
+_MOST_RESULTS = 2000  # compiling takes 10 s, and four times as long for twice as many
+_DEEPEST = 2500  # XLA follows chains recursively: with 7000 the stack is used up
 
 
 def kernels_supported() -> bool:
@@ -36,7 +41,7 @@ def kernels_supported() -> bool:
     choice = os.environ.get("ELASTAX_KERNELS", "")
     if choice:
         return choice != "0"
-    numbers = jaxlib.__version__.split(".")[:3]
+    numbers = jaxlib.version.__version__.split(".")[:3]
     version = tuple(int("".join(filter(str.isdigit, n)) or 0) for n in numbers)
     return _TESTED[0] <= version < _TESTED[1]
 
@@ -47,6 +52,7 @@ _ELEMENT_TYPES: dict[str, Callable] = {
     "bool": lambda: ir.IntegerType.get_signless(1),
     "int32": lambda: ir.IntegerType.get_signless(32),
     "int64": lambda: ir.IntegerType.get_signless(64),
+    "uint32": lambda: ir.IntegerType.get_unsigned(32),
 }
 
 
@@ -58,8 +64,9 @@ def _literal(value: Any, shape: Sequence[int], dtype: str) -> Any:
     array = np.full(shape, value, dtype)
     if dtype == "bool":
         array = np.packbits(array, bitorder="little")
+    buffer: Any = np.ascontiguousarray(array)
     attribute = ir.DenseElementsAttr.get(
-        np.ascontiguousarray(array), type=_ELEMENT_TYPES[dtype](), shape=list(shape)
+        buffer, type=_ELEMENT_TYPES[dtype](), shape=list(shape)
     )
     return hlo.constant(attribute)
 
@@ -260,7 +267,7 @@ class _Kernel:
             with ir.InsertionPoint(block):
                 mhlo.ReturnOp(self._scalars(dict(zip(rows, block.arguments)), made))
             values.update(zip(made, fusion.operation.results))
-        columns = [values[node] for node in self.results]
+        columns: list[Any] = [values[node] for node in self.results]
         if len(columns) == 1:
             return columns[0]
         return hlo.concatenate(
@@ -325,7 +332,11 @@ def emit_kernel(
     Raises:
         NotScalarError: the program has no scalar form.
     """
-    program.scalars  # raises before anything is emitted
+    graph, results = program.scalars  # raises before anything is emitted
+    if len(set(results)) > _MOST_RESULTS:
+        raise NotScalarError("too many results")
+    if graph.depth(results) > _DEEPEST:
+        raise NotScalarError("too long a chain of operations")
     shapes = [a.shape[: len(levels)] for a in ctx.avals_in]
     kernel, function = _function(ctx, program, levels, tuple(shapes))
     gathered = kernel.gather(operands)

@@ -1,5 +1,6 @@
 """From a jaxpr on small arrays to a graph of scalars."""
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -7,7 +8,7 @@ from typing import Any
 import numpy as np
 from jax.extend.core import ClosedJaxpr, Literal
 
-from ._graph import Graph
+from ._graph import Graph, NotScalarError
 from ._moves import (
     broadcast_in_dim,
     dynamic_slice,
@@ -17,10 +18,6 @@ from ._moves import (
     pad,
     scatter,
 )
-
-
-class NotScalarError(Exception):
-    """The function uses something that has no scalar form here."""
 
 
 Nodes = np.ndarray  # of node indices, int64
@@ -44,11 +41,11 @@ def expand(closed: ClosedJaxpr, graph: Graph, arguments: Sequence[Nodes]) -> lis
 
     def read(atom):
         if isinstance(atom, Literal):
-            return graph.constants(np.asarray(atom.val), str(atom.aval.dtype))
+            return graph.constants(atom.val, _dtype(atom))
         return values[atom]
 
     for var, constant in zip(jaxpr.constvars, closed.consts):
-        values[var] = graph.constants(np.asarray(constant), str(var.aval.dtype))
+        values[var] = graph.constants(constant, _dtype(var))
     values.update(zip(jaxpr.invars, arguments))
     for eqn in jaxpr.eqns:
         if not eqn.outvars:
@@ -57,12 +54,16 @@ def expand(closed: ClosedJaxpr, graph: Graph, arguments: Sequence[Nodes]) -> lis
         rule = _RULES.get(name)
         if rule is None:
             raise NotScalarError(name)
-        dtypes = [str(getattr(v.aval, "dtype", "")) for v in eqn.outvars]
-        outputs = rule(graph, [read(v) for v in eqn.invars], dtypes[0], eqn.params)
+        operands = [read(v) for v in eqn.invars]
+        outputs = rule(graph, operands, _dtype(eqn.outvars[0]), eqn.params)
         outputs = outputs if isinstance(outputs, list) else [outputs]
         for var, output in zip(eqn.outvars, outputs):
             values[var] = np.asarray(output, np.int64).reshape(var.aval.shape)
     return [read(v) for v in jaxpr.outvars]
+
+
+def _dtype(atom: Any) -> str:
+    return str(getattr(atom.aval, "dtype", ""))
 
 
 def _each(function: Callable, *operands: Nodes) -> Nodes:
@@ -73,11 +74,23 @@ def _each(function: Callable, *operands: Nodes) -> Nodes:
     return np.array(results, np.int64).reshape(operands[0].shape)
 
 
+def _convert(graph, operands, dtype, _=None):
+    return _each(lambda a: graph.apply("convert", a, dtype=dtype), *operands)
+
+
 def _elementwise(name: str) -> Callable:
     def rule(graph, operands, dtype, _):
         return _each(lambda *a: graph.apply(name, *a, dtype=dtype), *operands)
 
     return rule
+
+
+def _pow(graph, operands, dtype, _):
+    def one(base, exponent):
+        exponent = graph.apply("convert", exponent, dtype=dtype)
+        return graph.apply("pow", base, exponent, dtype=dtype)
+
+    return _each(one, *operands)
 
 
 def _power(graph: Graph, node: int, exponent: int) -> int:
@@ -100,31 +113,41 @@ def _integer_pow(graph, operands, dtype, params):
 
 
 def _logistic(graph, operands, dtype, _):
-    # 1/2 + tanh(x/2)/2 neither overflows nor needs a branch
-    half = graph.constant(0.5, dtype)
+    # 1/(1 + exp(-x)): where exp overflows, the quotient is the right zero
+    one = graph.constant(1, dtype)
 
-    def one(a):
-        t = graph.apply("tanh", graph.multiply(half, a), dtype=dtype)
-        return graph.add(half, graph.multiply(half, t))
+    def logistic(a):
+        minus = graph.apply("neg", a, dtype=dtype)
+        growing = graph.apply("exp", minus, dtype=dtype)
+        return graph.apply("div", one, graph.add(one, growing), dtype=dtype)
 
-    return _each(one, *operands)
+    return _each(logistic, *operands)
 
 
 def _select_n(graph, operands, dtype, _):
     which, *cases = operands
-    if len(cases) != 2:
-        raise NotScalarError("select_n of more than two cases")
-    return _each(
-        lambda w, no, yes: graph.apply("select", w, yes, no, dtype=dtype),
-        np.broadcast_to(which, cases[0].shape),
-        *cases,
-    )
+
+    def choose(w, *cases):
+        result = cases[0]
+        for k, case in enumerate(cases[1:], 1):
+            chosen = w
+            if graph.dtypes[w] != "bool":
+                least = graph.constant(k, graph.dtypes[w])
+                chosen = graph.apply("ge", w, least, dtype="bool")
+            result = graph.apply("select", chosen, case, result, dtype=dtype)
+        return result
+
+    return _each(choose, np.broadcast_to(which, cases[0].shape), *cases)
 
 
 def _clamp(graph, operands, dtype, _):
     low, x, high = operands
     bounded = _each(lambda a, b: graph.apply("max", a, b, dtype=dtype), x, low)
     return _each(lambda a, b: graph.apply("min", a, b, dtype=dtype), bounded, high)
+
+
+# of no elements; JAX refuses the largest of no integers, or gives their limit
+_EMPTY = {"mul": 1, "max": -np.inf, "min": np.inf, "and": True, "or": False}
 
 
 def _reduction(name: str) -> Callable:
@@ -134,11 +157,13 @@ def _reduction(name: str) -> Callable:
         rest = [d for d in range(x.ndim) if d not in axes]
         shape = [x.shape[d] for d in rest]
         count = math.prod(x.shape[d] for d in axes)
-        rows = np.transpose(x, [*rest, *axes]).reshape(-1, count).tolist()
+        rows = np.transpose(x, [*rest, *axes]).reshape(math.prod(shape), count).tolist()
 
         def reduce(row):
             if name == "add":
                 return graph.total(row, dtype)
+            if not row:
+                return graph.constant(_EMPTY[name], dtype)
             result = row[0]
             for node in row[1:]:
                 result = graph.apply(name, result, node, dtype=dtype)
@@ -163,7 +188,7 @@ def _cumsum(graph, operands, dtype, params):
 
 def _dot_general(graph, operands, dtype, params):
     (lc, rc), (lb, rb) = params["dimension_numbers"]
-    a, b = operands
+    a, b = (_convert(graph, [x], dtype) for x in operands)
     left = matrices(a, lb, lc, True)
     right = matrices(b, rb, rc, True)
     out = np.array(
@@ -246,26 +271,34 @@ def _gather(graph, operands, dtype, params):
     x, indices = operands
     mode, fill = str(params["mode"]), params["fill_value"]
     if fill is None:
-        fill = 0 if dtype.startswith(("int", "bool", "uint")) else np.nan
+        fill = np.nan
+        if dtype == "bool":
+            fill = True
+        elif dtype.startswith(("int", "uint")):
+            numbers = np.iinfo(dtype)
+            fill = numbers.min or numbers.max
     return gather(
         x,
         _numbers(graph, indices),
         params["dimension_numbers"],
         params["slice_sizes"],
-        "CLIP" in mode,
+        "FILL" not in mode,
         graph.constant(fill, dtype),
     )
 
 
-def _scatter(combine: Callable) -> Callable:
+def _scatter(combine: Callable | None) -> Callable:
     def rule(graph, operands, dtype, params):
         x, indices, updates = operands
+        if combine is None and params["update_jaxpr"] is not None:
+            raise NotScalarError("a function applied by scatter")
         return scatter(
             x,
             _numbers(graph, indices),
             updates,
             params["dimension_numbers"],
-            lambda old, new: combine(graph, old, new),
+            lambda old, new: combine(graph, old, new) if combine else new,
+            "CLIP" in str(params["mode"]),
         )
 
     return rule
@@ -324,15 +357,28 @@ def _scan(graph, operands, dtype, params):
 
 
 def _program(graph, operands, dtype, params):
-    if params["levels"]:
-        raise NotScalarError("a batched kernel inside a kernel")
-    return expand(params["program"].closed, graph, operands)
+    closed, levels = params["program"].closed, params["levels"]
+    samples = [
+        expand(
+            closed,
+            graph,
+            [
+                np.asarray(x[tuple(min(i, n - 1) for i, n in zip(place, x.shape))])
+                for x in operands
+            ],
+        )
+        for place in itertools.product(*map(range, levels))
+    ]
+    return [
+        np.array([s[k] for s in samples], np.int64).reshape(*levels, *aval.shape)
+        for k, aval in enumerate(closed.out_avals)
+    ]
 
 
 _RULES: dict[str, Callable] = {
     name: _elementwise(name)
     for name in (
-        "add sub mul div rem neg max min pow atan2 sin cos tan exp expm1 log log1p "
+        "add sub mul div rem neg max min atan2 sin cos tan exp expm1 log log1p "
         "sqrt rsqrt cbrt tanh abs sign floor ceil is_finite "
         "lt le gt ge eq ne and or xor not"
     ).split()
@@ -344,7 +390,8 @@ _RULES |= {
     "logistic": _logistic,
     "select_n": _select_n,
     "clamp": _clamp,
-    "convert_element_type": _elementwise("convert"),
+    "convert_element_type": _convert,
+    "pow": _pow,
     "reduce_sum": _reduction("add"),
     "reduce_max": _reduction("max"),
     "reduce_min": _reduction("min"),
@@ -356,7 +403,7 @@ _RULES |= {
     "cholesky": _cholesky,
     "triangular_solve": _triangular_solve,
     "gather": _gather,
-    "scatter": _scatter(lambda g, old, new: new),
+    "scatter": _scatter(None),
     "scatter-add": _scatter(lambda g, old, new: g.add(old, new)),
     "scatter-mul": _scatter(lambda g, old, new: g.multiply(old, new)),
     "dynamic_slice": lambda g, ops, dtype, p: dynamic_slice(

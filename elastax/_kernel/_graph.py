@@ -7,6 +7,15 @@ from typing import Any
 import numpy as np
 
 
+class NotScalarError(Exception):
+    """The function uses something that has no scalar form here."""
+
+
+TYPES = frozenset(("float64", "float32", "bool", "int32", "int64", "uint32"))
+
+_MOST_NODES = 200_000  # compiling takes 20 s for half of it
+
+
 def _fold_numpy(function: Callable) -> Callable:
     def fold(*values):
         with np.errstate(all="ignore"):
@@ -77,10 +86,18 @@ class Graph:
         key = (name, operands, dtype)
         index = self._known.get(key)
         if index is None:
-            index = self._known[key] = len(self.names)
-            self.names.append(name)
-            self.operands.append(operands)
-            self.dtypes.append(dtype)
+            index = self._append(key, name, operands, dtype)
+        return index
+
+    def _append(self, key: tuple, name: str, operands: tuple, dtype: str) -> int:
+        if dtype not in TYPES:
+            raise NotScalarError(f"numbers of type {dtype}")
+        if len(self.names) >= _MOST_NODES:
+            raise NotScalarError("too many operations")
+        index = self._known[key] = len(self.names)
+        self.names.append(name)
+        self.operands.append(operands)
+        self.dtypes.append(dtype)
         return index
 
     def constant(self, value: Any, dtype: str) -> int:
@@ -88,15 +105,14 @@ class Graph:
         key = ("constant", number.tobytes(), dtype)
         index = self._known.get(key)
         if index is None:
-            index = self._known[key] = len(self.names)
-            self.names.append("constant")
-            self.operands.append((number,))
-            self.dtypes.append(dtype)
+            index = self._append(key, "constant", (number,), dtype)
             self.values[index] = number
         return index
 
     def constants(self, array: Any, dtype: str) -> np.ndarray:
         """Nodes of all elements of a constant array."""
+        if dtype not in TYPES:
+            raise NotScalarError(f"numbers of type {dtype}")
         array = np.asarray(array)
         nodes = [self.constant(v, dtype) for v in array.ravel()]
         return np.array(nodes, np.int64).reshape(array.shape)
@@ -190,7 +206,10 @@ class Graph:
     def _convert(self, a: int, dtype: str) -> int:
         if self.dtypes[a] == dtype:
             return a
-        if a in self.values:
+        # what does not fit into an integer, NumPy and XLA convert differently
+        if a in self.values and (
+            dtype not in ("int32", "int64") or abs(self.values[a]) < 2**31
+        ):
             return self.constant(self.values[a], dtype)
         return self._node("convert", (a,), dtype)
 
@@ -205,3 +224,12 @@ class Graph:
                 if self.names[node] not in ("constant", "input"):
                     stack.extend(self.operands[node])
         return sorted(seen)
+
+    def depth(self, nodes: Iterable[int]) -> int:
+        """Operations in the longest chain that leads to one of the nodes."""
+        depths: dict[int, int] = {}
+        for node in self.needed(nodes):
+            known = self.names[node] in ("constant", "input")
+            before = () if known else self.operands[node]
+            depths[node] = 1 + max((depths[i] for i in before), default=-1)
+        return max(depths.values(), default=0)

@@ -8,6 +8,7 @@ import numpy as np
 
 
 def pad(x: np.ndarray, fill: int, config: Any) -> np.ndarray:
+    """`x` with `fill` around and between its elements; less than none cuts off."""
     for axis, (low, high, interior) in enumerate(config):
         n = x.shape[axis]
         spread = n + max(n - 1, 0) * interior
@@ -25,6 +26,7 @@ def pad(x: np.ndarray, fill: int, config: Any) -> np.ndarray:
 
 
 def broadcast_in_dim(x: np.ndarray, shape: Any, dimensions: Any) -> np.ndarray:
+    """`x` repeated along the axes of `shape` that are not among `dimensions`."""
     expanded = [1] * len(shape)
     for source, target in enumerate(dimensions):
         expanded[target] = x.shape[source]
@@ -64,9 +66,17 @@ def gather(
 
 
 def scatter(
-    x: np.ndarray, indices: np.ndarray, updates: np.ndarray, numbers: Any, combine: Any
+    x: np.ndarray,
+    indices: np.ndarray,
+    updates: np.ndarray,
+    numbers: Any,
+    combine: Any,
+    clip: bool,
 ) -> np.ndarray:
-    """`x` with updates combined in at constant indices; those outside are dropped."""
+    """`x` with updates combined in at constant indices.
+
+    Windows that lie outside are moved inside with `clip`, and dropped without.
+    """
     out = np.array(x)
     batching = (numbers.operand_batching_dims, numbers.scatter_indices_batching_dims)
     dropped = tuple(numbers.inserted_window_dims) + tuple(batching[0])
@@ -82,6 +92,8 @@ def scatter(
     for batch in itertools.product(*map(range, batches)):
         starts = _window_starts(indices, index_map, batching, batch)
         lows = [starts.get(d, 0) for d in range(x.ndim)]
+        if clip:
+            lows = [min(max(low, 0), n - s) for low, s, n in zip(lows, full, x.shape)]
         if any(low < 0 or low + s > n for low, s, n in zip(lows, full, x.shape)):
             continue
         update = updates[batch].reshape(full)
@@ -92,11 +104,13 @@ def scatter(
 
 
 def dynamic_slice(x: np.ndarray, starts: Any, sizes: Any) -> np.ndarray:
+    """Window of `x` at constant starts, moved inside where it would lie outside."""
     lows = [min(max(int(i), 0), n - s) for i, n, s in zip(starts, x.shape, sizes)]
     return x[tuple(slice(low, low + s) for low, s in zip(lows, sizes))]
 
 
 def dynamic_update_slice(x: np.ndarray, update: np.ndarray, starts: Any) -> np.ndarray:
+    """`x` with such a window replaced."""
     out = np.array(x)
     lows = [
         min(max(int(i), 0), n - s) for i, n, s in zip(starts, x.shape, update.shape)

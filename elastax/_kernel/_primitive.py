@@ -5,14 +5,16 @@ operand carries all of these axes in front, with length one where it is not batc
 """
 
 import functools
+from typing import Any
 
 import jax
+import jax.core
 import jax.numpy as jnp
 from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 
 from ._emit import emit_kernel, kernels_supported
-from ._expand import NotScalarError
+from ._graph import NotScalarError
 from ._program import Program
 
 
@@ -31,6 +33,9 @@ def _written_out(*operands, program: Program, levels: tuple[int, ...]):
     size, inner = levels[0], levels[1:]
     mapped = [x.shape[0] == size for x in operands]
     function = lambda *xs: _written_out(*xs, program=program, levels=inner)
+    if not any(mapped):
+        results = function(*(x[0] for x in operands))
+        return [jnp.broadcast_to(y, (size, *y.shape)) for y in results]
     return jax.vmap(function, in_axes=tuple(0 if m else None for m in mapped))(
         *(x if m else x[0] for x, m in zip(operands, mapped))
     )
@@ -42,6 +47,9 @@ def _compiled(program: Program, levels: tuple[int, ...]):
 
 
 def _evaluate(*operands, program, levels):
+    config: Any = jax.config
+    if config.jax_disable_jit or config.jax_debug_nans or config.jax_debug_infs:
+        return _written_out(*operands, program=program, levels=levels)
     return _compiled(program, levels)(*operands)
 
 
@@ -66,7 +74,7 @@ def _push(primals, tangents, *, program, levels):
     derived = program.tangent(moving)
     arguments = derived.select([*primals, *moved])
     if not arguments:
-        return outputs, [ad.Zero(jax.core.get_aval(x)) for x in outputs]
+        return outputs, [ad.Zero(jax.typeof(x).to_tangent_aval()) for x in outputs]
     pushed = kernel_p.bind(*arguments, program=derived.program, levels=levels)
     return outputs, pushed
 
@@ -74,12 +82,11 @@ def _push(primals, tangents, *, program, levels):
 def _pull(cotangents, *operands, program, levels):
     linear = tuple(ad.is_undefined_primal(x) for x in operands)
     fixed = [x for x, yes in zip(operands, linear) if not yes]
-    back = [
-        jnp.zeros(ct.aval.shape, ct.aval.dtype) if _zeros_of(ct) else ct
-        for ct in cotangents
-    ]
+    back = [ad.instantiate_zeros(ct) for ct in cotangents]
     derived = program.transposed(linear)
     arguments = derived.select([*fixed, *back])
+    if not arguments:
+        return [ad.Zero(x.aval) if yes else None for x, yes in zip(operands, linear)]
     pulled = iter(kernel_p.bind(*arguments, program=derived.program, levels=levels))
     results = []
     for x, yes in zip(operands, linear):
@@ -99,10 +106,23 @@ def _pull(cotangents, *operands, program, levels):
 _lower_written_out = mlir.lower_fun(_written_out, multiple_results=True)
 
 
+def _runs_alone(axis_context) -> bool:
+    """Whether XLA does not split the program over devices: it cannot split a kernel."""
+    if isinstance(axis_context, mlir.ShardingContext):
+        return axis_context.num_devices == 1
+    mesh = getattr(axis_context, "mesh", None)  # within `jax.shard_map`
+    return mesh is not None and all(
+        size == 1 or axis in axis_context.manual_axes
+        for axis, size in mesh.shape.items()
+    )
+
+
 def _lower_on_cpu(ctx, *operands, program, levels):
-    exported = ctx.module_context.lowering_parameters.for_export
-    empty = not any(a.size for a in program.outputs)
-    if kernels_supported() and not exported and not empty:
+    context = ctx.module_context
+    exported = context.lowering_parameters.for_export
+    empty = 0 in levels or not any(a.size for a in program.outputs)
+    alone = _runs_alone(context.axis_context)
+    if kernels_supported() and alone and not exported and not empty:
         try:
             return emit_kernel(ctx, operands, program, levels)
         except NotScalarError:

@@ -1,4 +1,6 @@
-r"""Newton-Euler recursion of the whole chain, as sums of screws.
+r"""Newton-Euler equations of the whole chain: inverse dynamics, mass matrix and bias.
+
+The mass matrix and the motion of the tool come from sums of screws.
 
 Every joint is a screw $S_k = (p_k \times z_k,\; z_k)$ in the base frame, referred to
 the base origin. In one common frame the recursions of (2.27) to (2.31) are plain sums
@@ -8,8 +10,7 @@ $V_k = \sum_{i \le k} S_i \dot s_i$,
 $A_k = \sum_{i \le k} (S_i \ddot s_i + V_i \times S_i \dot s_i) - (g, 0)$,
 $\tau_k = S_k^T \sum_{b \ge k} F_b$,
 
-so that the program does not grow with the number of joints. It runs on arrays and on
-`Series`; the latter gives the time derivatives of the torques along a motion.
+on arrays and on `Series`. The inverse dynamics is the recursion of `_recursion`.
 """
 
 from typing import Any
@@ -23,6 +24,7 @@ from .._kernel import kernel
 from .._taylor import Series, concatenate, cross, leading, product
 from ..kinematics import JointKind, MovingFrames, moving_frames
 from ._forces import applied_forces
+from ._recursion import generalised_forces
 from ._robot import ElasticRobot
 
 
@@ -62,52 +64,6 @@ def _behind(robot: ElasticRobot, joint: tuple[int, ...]) -> np.ndarray:
     """Ones where a body (column) hangs behind a joint (row)."""
     joints = np.arange(robot.chain.number)
     return (np.array(joint, int)[None, :] >= joints[:, None]).astype(float)
-
-
-def generalised_forces(robot: ElasticRobot, q, eta, qd, etad, qdd, etadd):
-    """Forces that the motion of the bodies in gravity asks for, of arrays or series.
-
-    Args:
-        robot: the robot; springs, friction and drive trains play no part.
-        q, qd, qdd: joint angles and their derivatives, shape (axes,).
-        eta, etad, etadd: elastic coordinates and theirs, shape (elastic,).
-
-    Returns:
-        Generalised forces of the coordinates (q, eta), shape (axes + elastic,).
-
-    References:
-        [Reiner2010] (2.27), (2.29), (2.31); in (2.31) the acceleration of the centre of
-        mass is the absolute one, not the component derivative of the velocity.
-    """
-    frames = moving_frames(robot.chain, robot.joint_coordinates(q, eta))
-    screws = joint_screws(robot, frames)
-    twist, acceleration = chain_motion(
-        robot,
-        screws,
-        robot.joint_coordinates(qd, etad),
-        robot.joint_coordinates(qdd, etadd),
-    )
-    bodies = robot.all_bodies()
-    index = np.array(bodies.joint, int)
-    rotation = frames.rotation[index]
-    com = frames.position[index] + product("kab,kb->ka", rotation, bodies.com)
-    v, w = twist[index, :3], twist[index, 3:]
-    a, alpha = acceleration[index, :3], acceleration[index, 3:]
-
-    a_com = a + cross(alpha, com) + cross(w, v + cross(w, com))
-    force = product("ka,k->ka", a_com, bodies.mass)
-    w_body = product("kab,ka->kb", rotation, w)
-    alpha_body = product("kab,ka->kb", rotation, alpha)
-    spin = product("kb,kab->ka", w_body, bodies.inertia)
-    moment_body = product("kb,kab->ka", alpha_body, bodies.inertia) + cross(
-        w_body, spin
-    )
-    moment = product("kab,kb->ka", rotation, moment_body) + cross(com, force)
-
-    wrench = concatenate([force, moment], axis=1)
-    behind = jnp.asarray(_behind(robot, bodies.joint), leading(screws).dtype)
-    forces = product("ka,ka->k", screws, product("jk,ka->ja", behind, wrench))
-    return product("jn,j->n", robot.coupling(), forces)
 
 
 @kernel

@@ -5,6 +5,8 @@ from ._chain import (
     SerialChain as SerialChain,
     forward_kinematics as forward_kinematics,
     link_poses as link_poses,
+    joint_steps as joint_steps,
+    joint_steps as joint_steps,
     moving_frames as moving_frames,
 )
 from ._damping import (

@@ -121,11 +121,17 @@ class MovingFrames(eqx.Module):
     tool_position: Float[Array, "3"] | Series
 
 
-def moving_frames(chain: SerialChain, q: PerJoint | Series) -> MovingFrames:
-    """Frames behind the motion of each joint, of coordinates or of their series.
+def joint_steps(chain: SerialChain, q: PerJoint | Series):
+    """Rotation and offset from each moving frame to the one behind the next joint.
 
-    References:
-        [Reiner2010] (2.26).
+    Args:
+        chain: the chain.
+        q: joint coordinates, array or series.
+
+    Returns:
+        Rotations (joints, 3, 3) of the coordinates' kind; offsets (joints, 3) [m] in the
+        frame in front of the joint, of that kind if a joint slides; joint axes in
+        the frames behind them, (joints, 3).
     """
     frames = chain.joints.frames()
     # constant transform from one moving frame to the next joint
@@ -143,6 +149,21 @@ def moving_frames(chain: SerialChain, q: PerJoint | Series) -> MovingFrames:
         - product("k,kab->kab", cosine - 1.0, rotation @ turn @ turn)
         + rotation
     )
+    if sliding.any():
+        slide = product("k,k->k", q, jnp.asarray(sliding, offset.dtype))
+        along = jnp.einsum("kab,kb->ka", rotation, frames.axis)
+        offset = product("k,ka->ka", slide, along) + offset
+    return step, offset, frames.axis
+
+
+def moving_frames(chain: SerialChain, q: PerJoint | Series) -> MovingFrames:
+    """Frames behind the motion of each joint, of coordinates or of their series.
+
+    References:
+        [Reiner2010] (2.26).
+    """
+    frames = chain.joints.frames()
+    step, offset, _ = joint_steps(chain, q)
     rotations = [step[0]]
     for k in range(1, chain.number):
         rotations.append(product("ab,bc->ac", rotations[-1], step[k]))
@@ -151,16 +172,12 @@ def moving_frames(chain: SerialChain, q: PerJoint | Series) -> MovingFrames:
 
     # origins: sums of the offsets, each turned by the link in front of it
     ahead = product("kab,kb->ka", rotation[:-1], offset[1:])
-    if isinstance(ahead, Series):
-        first = jnp.zeros((ahead.order + 1, 1, 3), offset.dtype).at[0, 0].set(offset[0])
-        parts = [Series(first), ahead]
-    else:
-        parts = [offset[:1], ahead]
-    increment = concatenate(parts)
-    if sliding.any():
-        slide = product("k,k->k", q, jnp.asarray(sliding, offset.dtype))
-        increment = increment + product("k,ka->ka", slide, axis)
-    sums = jnp.asarray(np.tri(chain.number), offset.dtype)
+    first = offset[:1]
+    if isinstance(ahead, Series) and not isinstance(first, Series):
+        constant = jnp.zeros((ahead.order + 1, 1, 3), first.dtype)
+        first = Series(constant.at[0].set(first))
+    increment = concatenate([first, ahead])
+    sums = jnp.asarray(np.tri(chain.number), leading(offset).dtype)
     position = product("jk,ka->ja", sums, increment)
 
     last = frames.after[-1] @ chain.tool
