@@ -314,6 +314,12 @@ def _slice(graph, operands, dtype, params):
     return operands[0][tuple(slice(*b) for b in bounds)]
 
 
+def _reshape(graph, operands, dtype, params):
+    # `expand` gives the new shape
+    order = params["dimensions"]
+    return operands[0] if order is None else np.transpose(operands[0], order)
+
+
 def _iota(graph, operands, dtype, params):
     shape, dimension = params["shape"], params["dimension"]
     count = np.arange(shape[dimension])
@@ -353,7 +359,28 @@ def _scan(graph, operands, dtype, params):
             params["jaxpr"], graph, [*fixed, *state, *(x[k] for x in series)]
         )
         state, rows[k] = outputs[:carried], outputs[carried:]
-    return [*state, *(np.stack(column) for column in zip(*rows))]
+    shapes = [aval.shape for aval in params["jaxpr"].out_avals[carried:]]
+    return [*state, *_stacked(rows, (length,), shapes)]
+
+
+def _stacked(rows: list, before: tuple, shapes: Sequence[tuple]) -> list[Nodes]:
+    """Results of all samples in one array each, of shape `before` + its own."""
+    return [
+        np.array([row[k] for row in rows], np.int64).reshape(before + shape)
+        for k, shape in enumerate(shapes)
+    ]
+
+
+def _platform_index(graph, operands, dtype, params):
+    fits = [p is None or "cpu" in p for p in params["platforms"]]
+    return np.array(graph.constant(fits.index(True), dtype))
+
+
+def _cond(graph, operands, dtype, params):
+    index, *rest = operands
+    branches = params["branches"]
+    which = min(max(int(_numbers(graph, index)), 0), len(branches) - 1)
+    return expand(branches[which], graph, rest)
 
 
 def _program(graph, operands, dtype, params):
@@ -369,10 +396,7 @@ def _program(graph, operands, dtype, params):
         )
         for place in itertools.product(*map(range, levels))
     ]
-    return [
-        np.array([s[k] for s in samples], np.int64).reshape(*levels, *aval.shape)
-        for k, aval in enumerate(closed.out_avals)
-    ]
+    return _stacked(samples, levels, [aval.shape for aval in closed.out_avals])
 
 
 _RULES: dict[str, Callable] = {
@@ -419,7 +443,7 @@ _RULES |= {
     "broadcast_in_dim": lambda g, ops, dtype, p: broadcast_in_dim(
         ops[0], p["shape"], p["broadcast_dimensions"]
     ),
-    "reshape": lambda g, ops, dtype, p: ops[0],  # `expand` gives the new shape
+    "reshape": _reshape,
     "squeeze": lambda g, ops, dtype, p: ops[0],
     "expand_dims": lambda g, ops, dtype, p: ops[0],
     "copy": lambda g, ops, dtype, p: ops[0],
@@ -429,15 +453,19 @@ _RULES |= {
     "rev": lambda g, ops, dtype, p: np.flip(ops[0], p["dimensions"]),
     "concatenate": lambda g, ops, dtype, p: np.concatenate(ops, p["dimension"]),
     "stack": lambda g, ops, dtype, p: np.stack(ops, p["axis"]),
+    "unstack": lambda g, ops, dtype, p: list(np.moveaxis(ops[0], p["axis"], 0)),
     "tile": lambda g, ops, dtype, p: np.tile(ops[0], p["reps"]),
     "jit": _call("jaxpr"),
     "pjit": _call("jaxpr"),
     "closed_call": _call("call_jaxpr"),
     "core_call": _call("call_jaxpr"),
     "remat": _call("jaxpr"),
+    "remat2": _call("jaxpr"),
     "checkpoint": _call("jaxpr"),
     "custom_jvp_call": _call("call_jaxpr"),
     "custom_vjp_call": _call("call_jaxpr"),
     "scan": _scan,
+    "cond": _cond,
+    "platform_index": _platform_index,
     "elastax_kernel": _program,
 }

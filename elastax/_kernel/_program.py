@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax
+import jax.core
 import numpy as np
-from jax.extend.core import ClosedJaxpr, jaxpr_as_fun
+from jax.extend.core import ClosedJaxpr
 from jax.interpreters.partial_eval import dce_jaxpr
 
 from ._expand import expand
@@ -41,7 +42,7 @@ class Program:
 
     def __call__(self, *arguments: Any) -> list:
         """The function as it is written."""
-        return jaxpr_as_fun(self.closed)(*arguments)
+        return jax.core.eval_jaxpr(self.closed.jaxpr, self.closed.consts, *arguments)
 
     @functools.cached_property
     def scalars(self) -> tuple[Graph, list[int]]:
@@ -99,7 +100,9 @@ class Program:
 def trace(function: Any, avals: Any, name: str) -> Program:
     """Program of a function of arrays with the given shapes."""
     structs = [jax.ShapeDtypeStruct(np.shape(a), a.dtype) for a in avals]
-    return Program(jax.make_jaxpr(function)(*structs), name)
+    # the program must not remember the devices over which it is first used
+    with jax.sharding.use_abstract_mesh(jax.sharding.AbstractMesh((), ())):
+        return Program(jax.make_jaxpr(function)(*structs), name)
 
 
 class Derived(NamedTuple):

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 from .._custom_types import PerElastic, PerJoint
 from .._kernel import kernel
 from ._forces import applied_forces
-from ._newton_euler import generalised_forces, multibody
+from ._newton_euler import forces_by_screws, multibody
 from ._robot import ElasticRobot
 
 
@@ -141,7 +141,7 @@ def _link_acceleration_jvp(primals, tangents):
     def unbalanced(robot, state, tau_m):
         q, eta, theta, qd, etad, thetad = state
         links = (q, eta, qd, etad)
-        total = generalised_forces(robot, *links, acceleration[:n], acceleration[n:])
+        total = forces_by_screws(robot, *links, acceleration[:n], acceleration[n:])
         joint, structure = applied_forces(robot, *links)
         if robot.has_elastic_gears:
             drive = -robot.drives.gear_torque(q - theta, qd - thetad)

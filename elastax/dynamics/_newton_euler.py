@@ -66,6 +66,44 @@ def _behind(robot: ElasticRobot, joint: tuple[int, ...]) -> np.ndarray:
     return (np.array(joint, int)[None, :] >= joints[:, None]).astype(float)
 
 
+def forces_by_screws(robot: ElasticRobot, q, eta, qd, etad, qdd, etadd):
+    """`generalised_forces` in the terms of `multibody`, as a sum of screws.
+
+    Equal to the recursion for every robot. Only for frames that are not orthogonal, as
+    a difference quotient of a rotation's elements makes them, do the two differ; this
+    one then still equals mass matrix times acceleration plus bias.
+    """
+    frames = moving_frames(robot.chain, robot.joint_coordinates(q, eta))
+    screws = joint_screws(robot, frames)
+    twist, acceleration = chain_motion(
+        robot,
+        screws,
+        robot.joint_coordinates(qd, etad),
+        robot.joint_coordinates(qdd, etadd),
+    )
+    bodies = robot.all_bodies()
+    index = np.array(bodies.joint, int)
+    rotation = frames.rotation[index]
+    com = frames.position[index] + product("kab,kb->ka", rotation, bodies.com)
+    v, w = twist[index, :3], twist[index, 3:]
+    a, alpha = acceleration[index, :3], acceleration[index, 3:]
+
+    a_com = a + cross(alpha, com) + cross(w, v + cross(w, com))
+    force = product("ka,k->ka", a_com, bodies.mass)
+    w_body = product("kab,ka->kb", rotation, w)
+    alpha_body = product("kab,ka->kb", rotation, alpha)
+    spin = product("kb,kab->ka", w_body, bodies.inertia)
+    moment_body = product("kb,kab->ka", alpha_body, bodies.inertia) + cross(
+        w_body, spin
+    )
+    moment = product("kab,kb->ka", rotation, moment_body) + cross(com, force)
+
+    wrench = concatenate([force, moment], axis=1)
+    behind = jnp.asarray(_behind(robot, bodies.joint), leading(screws).dtype)
+    forces = product("ka,ka->k", screws, product("jk,ka->ja", behind, wrench))
+    return product("jn,j->n", robot.coupling(), forces)
+
+
 @kernel
 def inverse_dynamics(
     robot: ElasticRobot,

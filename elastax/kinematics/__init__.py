@@ -4,9 +4,8 @@ from ._chain import (
     MovingFrames as MovingFrames,
     SerialChain as SerialChain,
     forward_kinematics as forward_kinematics,
+    joint_steps as joint_steps,
     link_poses as link_poses,
-    joint_steps as joint_steps,
-    joint_steps as joint_steps,
     moving_frames as moving_frames,
 )
 from ._damping import (

@@ -129,8 +129,8 @@ def joint_steps(chain: SerialChain, q: PerJoint | Series):
         q: joint coordinates, array or series.
 
     Returns:
-        Rotations (joints, 3, 3) of the coordinates' kind; offsets (joints, 3) [m] in the
-        frame in front of the joint, of that kind if a joint slides; joint axes in
+        Rotations (joints, 3, 3) of the coordinates' kind; offsets (joints, 3) [m] in
+        the frame in front of the joint, of that kind if a joint slides; joint axes in
         the frames behind them, (joints, 3).
     """
     frames = chain.joints.frames()

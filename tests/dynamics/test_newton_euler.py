@@ -15,6 +15,7 @@ from elastax.dynamics import (
     multibody,
     potential_energy,
 )
+from elastax.dynamics._newton_euler import forces_by_screws
 from elastax.robots import kr210
 
 from tests import systems
@@ -203,3 +204,16 @@ def test_elastic_robot_against_pinocchio(peer):
         theirs = coupling.T @ pin.nonLinearEffects(model, data, x, xd)
         assert_close(bias[k], theirs, rtol=0, atol=1e-10 * np.abs(theirs).max())
     assert n + robot.elastic == 14 and model.nv == 17
+
+
+def test_recursion_is_the_sum_of_screws():
+    """With sliding axes among the turning ones."""
+    robot = systems.random_robot(7, 4, 5, counterbalance=False)
+    q, eta, _, qd, etad, _, qdd, etadd, _ = (
+        x[0] for x in systems.random_state(robot, 5, 1)
+    )
+    motion = (q, eta, qd, etad, qdd, etadd)
+    expected = systems.run(forces_by_screws, robot, *motion)
+    scale = np.abs(expected).max()
+    actual = systems.run(generalised_forces, robot, *motion)
+    assert_close(actual, expected, rtol=0, atol=1e-12 * scale)
