@@ -198,6 +198,8 @@ def _rest(robot, setpoint, controller):
 
 @_rest.defjvp
 def _rest_jvp(primals, tangents):
-    x = _rest(*primals)
-    _, moved = jax.jvp(lambda *a: _unrest(*a, x), primals, tangents)
-    return x, -jnp.linalg.solve(_slope(*primals, x), moved)
+    robot, setpoint, controller = primals
+    x = _rest(robot, setpoint, controller)
+    off = lambda robot, setpoint, controller: _unrest(robot, setpoint, controller, x)
+    _, moved = jax.jvp(off, primals, tangents)
+    return x, -jnp.linalg.solve(_slope(robot, setpoint, controller, x), moved)
