@@ -9,6 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax.sharding import AbstractMesh, AxisType, Mesh, PartitionSpec
 
+from ._kernel import Program, kernels_supported
+
 
 _AXIS = "elastax_batch"
 
@@ -131,6 +133,8 @@ def _primitives(jaxpr: Any) -> set[str]:
             waiting.extend(v for e in item.eqns for v in e.params.values())
         elif hasattr(item, "jaxpr"):
             waiting.append(item.jaxpr)
+        elif isinstance(item, Program) and not kernels_supported():
+            waiting.append(item.closed)  # runs as it is written, LAPACK included
     return names
 
 
