@@ -135,14 +135,14 @@ class _Kernel:
         add_function: Callable,
     ):
         self.graph, self.results = program.scalars
-        self.nodes = self.graph.needed(self.results)
         self.add_function = add_function
         self.dtype = str(program.outputs[0].dtype)
         self.levels = levels
         self.shapes = shapes
         self.sizes = [math.prod(a.shape) for a in program.inputs]
         self.where = [(k, j) for k, size in enumerate(self.sizes) for j in range(size)]
-        inputs = [n for n in self.nodes if self.graph.names[n] == "input"]
+        needed = self.graph.needed(self.results)
+        inputs = [n for n in needed if self.graph.names[n] == "input"]
         # operands that matter; XLA refuses empty ones here
         self.used = sorted({self._place_of(n)[0] for n in inputs})
         changing = [

@@ -9,10 +9,11 @@ $\dot\omega_k = E_k^T \dot\omega_{k-1} + z_k \ddot s_k + (E_k^T \omega_{k-1}) \t
 $a_k = E_k^T (a_{k-1} + \dot\omega_{k-1} \times p_k + \omega_{k-1} \times (\omega_{k-1}
 \times p_k))$,
 
-with E_k and p_k the step from link k-1 to link k. The bodies of a link count as one:
-its mass, first moment and inertia about the origin. It runs on arrays and on `Series`,
-which gives the time derivatives of the torques along a motion. `multibody` holds the
-same equations as sums of screws.
+for turning joints, [Reiner2010] (2.27) and (2.31), with E_k and p_k the step from link
+k-1 to link k; a sliding joint adds to the acceleration instead. The bodies of a link
+count as one: its mass, first moment and inertia about the origin. It runs on arrays and
+on `Series`, which gives the time derivatives of the torques along a motion.
+`multibody` holds the same equations as sums of screws.
 """
 
 from typing import Any

@@ -132,6 +132,9 @@ def joint_steps(chain: SerialChain, q: PerJoint | Series):
         Rotations (joints, 3, 3) of the coordinates' kind; offsets (joints, 3) [m] in
         the frame in front of the joint, of that kind if a joint slides; joint axes in
         the frames behind them, (joints, 3).
+
+    References:
+        [Reiner2010] (2.26); Rodrigues' formula for the turn about a joint's axis.
     """
     frames = chain.joints.frames()
     # constant transform from one moving frame to the next joint

@@ -22,6 +22,7 @@ from tests.helpers import assert_close
 @pytest.mark.parametrize("power", [0.0, 1.0, 2.5])
 def test_exponent_of_a_power(power):
     sizes = np.array([3.0, 10.0, 40.0])
+    # rounding
     np.testing.assert_allclose(exponent(sizes, 7e-6 * sizes**power), power, atol=1e-12)
 
 
@@ -68,17 +69,17 @@ def test_uses_agree():
     }
     x, y = (np.asarray(s) for s in states)
     value = 1e3 * x[:, None] * y[:, :, None]
-    for use in ("scan", "vmap"):
+    for use in ("scan", "vmap"):  # rounding
         assert_close(results[use], (value, x), rtol=1e-15)
-    # relative change of 0.1 of three factors
+    # relative change of 0.1 of three factors  # rounding
     assert_close(results["jvp"], (0.3 * value, 0.1 * x), rtol=1e-14)
-    (by_x, by_y), (one, zero) = results["jacfwd"]
-    assert_close(by_x[..., 0], value / x[:, None], rtol=1e-14)
+    (by_x, by_y), (one, zero) = results["jacfwd"]  # rounding
+    assert_close(by_x[..., 0], value / x[:, None], rtol=1e-14)  # rounding
     assert_close(by_y[:, 0, 0, 0], 1e3 * x[:, 0], rtol=1e-14)
     assert_close((one, zero), (np.ones((5, 1, 1)), np.zeros((5, 1, 2))), rtol=0)
     pulled, pulled_x, _ = results["vjp"]
-    by_stiffness = np.sum(x * y)[None]
-    assert_close(pulled.drives.stiffness.linear, by_stiffness, rtol=1e-14)
+    by_stiffness = np.sum(x * y)[None]  # rounding
+    assert_close(pulled.drives.stiffness.linear, by_stiffness, rtol=1e-14)  # rounding
     assert_close(pulled_x, 1e3 * y.sum(axis=1, keepdims=True) + 1.0, rtol=1e-14)
 
 

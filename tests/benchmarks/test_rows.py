@@ -55,6 +55,7 @@ def test_label_tells_rows_apart():
 def test_relative_difference_is_that_of_each_sample():
     desired = np.array([[1.0, -4.0], [1e-3, 0.0]])
     actual = desired + np.array([[0.0, 0.4], [0.0, 1e-4]])
+    # rounding
     np.testing.assert_allclose(relative_difference(actual, desired), 0.1, rtol=1e-12)
     assert relative_difference(desired, desired) == 0.0
     assert relative_difference(desired[:, :0], desired[:, :0]) == 0.0
