@@ -159,10 +159,10 @@ def concatenate(parts: Any, axis: int = 0) -> Any:
     return jnp.concatenate(parts, axis=axis)
 
 
-_LEVI_CIVITA = np.zeros((3, 3, 3))
+LEVI_CIVITA = np.zeros((3, 3, 3))
 for _i, _j, _k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-    _LEVI_CIVITA[_i, _j, _k] = 1.0
-    _LEVI_CIVITA[_i, _k, _j] = -1.0
+    LEVI_CIVITA[_i, _j, _k] = 1.0
+    LEVI_CIVITA[_i, _k, _j] = -1.0
 
 
 def skew(vector: Any) -> Any:
@@ -171,7 +171,7 @@ def skew(vector: Any) -> Any:
     References:
         [Reiner2010] (A.2).
     """
-    tensor = jnp.asarray(_LEVI_CIVITA, leading(vector).dtype)
+    tensor = jnp.asarray(LEVI_CIVITA, leading(vector).dtype)
     return linear(lambda v: -jnp.tensordot(v, tensor, axes=(-1, 2)), vector)
 
 

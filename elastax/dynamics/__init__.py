@@ -24,11 +24,12 @@ from ._equilibrium import (
     static_equilibrium as static_equilibrium,
 )
 from ._lagrange import lagrange_forces as lagrange_forces
-from ._newton_euler import (
-    generalised_forces as generalised_forces,
-    inverse_dynamics as inverse_dynamics,
-    multibody as multibody,
+from ._linearised import (
+    LinearisedBodies as LinearisedBodies,
+    body_accelerations as body_accelerations,
+    linearised_bodies as linearised_bodies,
 )
+from ._newton_euler import inverse_dynamics as inverse_dynamics
 from ._parts import (
     Axis as Axis,
     Body as Body,
@@ -39,6 +40,7 @@ from ._parts import (
     WristCentre as WristCentre,
     assemble as assemble,
 )
+from ._recursion import generalised_forces as generalised_forces
 from ._robot import (
     AxisRole as AxisRole,
     ElasticRobot as ElasticRobot,
@@ -46,6 +48,7 @@ from ._robot import (
     JointLimits as JointLimits,
     SlopeRole as SlopeRole,
 )
+from ._screws import multibody as multibody
 from ._simulate import (
     SimulationResult as SimulationResult,
     resting_state as resting_state,

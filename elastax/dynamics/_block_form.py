@@ -1,15 +1,15 @@
 """Equations of motion in the blocks of joints, structure and motors."""
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._custom_types import PerElastic, PerJoint
-from .._kernel import kernel
+from .._kernel import kernel, kernel_in_parts
 from ._forces import applied_forces
-from ._newton_euler import forces_by_screws, multibody
+from ._linearised import body_accelerations
 from ._robot import ElasticRobot
+from ._screws import multibody
 
 
 class EquationsOfMotion(eqx.Module):
@@ -90,6 +90,18 @@ def equations_of_motion(
 
 
 @kernel
+def _loads(robot: ElasticRobot, q, eta, theta, qd, etad, thetad, tau_m):
+    """Forces on joints and structure besides those of the bodies, on the motors."""
+    joint, structure = applied_forces(robot, q, eta, qd, etad)
+    friction = robot.drives.motor_friction.torque
+    if not robot.has_elastic_gears:
+        return jnp.concatenate([tau_m - friction(qd) - joint, -structure]), tau_m
+    gear = robot.drives.gear_torque(q - theta, qd - thetad)
+    motor = tau_m - friction(thetad) + gear
+    return jnp.concatenate([-joint - gear, -structure]), motor
+
+
+@kernel_in_parts
 def forward_dynamics(
     robot: ElasticRobot,
     q: PerJoint,
@@ -100,10 +112,7 @@ def forward_dynamics(
     thetad: PerJoint,
     tau_m: PerJoint,
 ) -> tuple[PerJoint, PerElastic, PerJoint]:
-    r"""Accelerations of joints, structure and motors under the motor torque `tau_m`.
-
-    The derivatives need no derivative of the mass matrix: where $a$ solves
-    $r(x, a) = 0$, the inverse dynamics, $M\,\delta a = -\partial_x r\,\delta x$.
+    """Accelerations of joints, structure and motors under the motor torque `tau_m`.
 
     Args:
         robot: the robot.
@@ -114,50 +123,10 @@ def forward_dynamics(
         qdd (axes,), etadd (elastic,), thetadd (axes,) [rad/s^2]; for rigid gears
         thetadd equals qdd.
     """
-    state = (q, eta, theta, qd, etad, thetad)
-    acceleration = _link_acceleration(robot, state, tau_m)
+    force, motor = _loads(robot, q, eta, theta, qd, etad, thetad, tau_m)
+    rotors = None if robot.has_elastic_gears else robot.drives.reflected_inertia()
+    acceleration = body_accelerations(robot, q, eta, qd, etad, force, rotors)
     qdd, etadd = acceleration[: robot.axes], acceleration[robot.axes :]
     if not robot.has_elastic_gears:
         return qdd, etadd, qdd
-    gear = robot.drives.gear_torque(q - theta, qd - thetad)
-    load = robot.drives.motor_friction.torque(thetad) - gear
-    return qdd, etadd, (tau_m - load) / robot.drives.reflected_inertia()
-
-
-@jax.custom_jvp
-def _link_acceleration(robot: ElasticRobot, state, tau_m):
-    eom = equations_of_motion(robot, *state)
-    drive = jnp.zeros_like(tau_m) if robot.has_elastic_gears else tau_m
-    force = jnp.concatenate([drive - eom.h_a, -eom.h_e])
-    return _solve(_mass(eom), force)
-
-
-@_link_acceleration.defjvp
-def _link_acceleration_jvp(primals, tangents):
-    robot, state, tau_m = primals
-    acceleration = _link_acceleration(robot, state, tau_m)
-    n = robot.axes
-
-    def unbalanced(robot, state, tau_m):
-        q, eta, theta, qd, etad, thetad = state
-        links = (q, eta, qd, etad)
-        total = forces_by_screws(robot, *links, acceleration[:n], acceleration[n:])
-        joint, structure = applied_forces(robot, *links)
-        if robot.has_elastic_gears:
-            drive = -robot.drives.gear_torque(q - theta, qd - thetad)
-        else:
-            rotors = robot.drives.reflected_inertia() * acceleration[:n]
-            drive = tau_m - rotors - robot.drives.motor_friction.torque(qd)
-        return jnp.concatenate([joint - drive, structure]) + total
-
-    _, missing = jax.jvp(unbalanced, primals, tangents)
-    mass = _mass(equations_of_motion(robot, *state))
-    return acceleration, -_solve(mass, missing)
-
-
-def _mass(eom: EquationsOfMotion):
-    return jnp.block([[eom.M_aa, eom.M_ae], [eom.M_ae.T, eom.M_ee]])
-
-
-def _solve(mass, force):
-    return jax.scipy.linalg.cho_solve(jax.scipy.linalg.cho_factor(mass), force)
+    return qdd, etadd, motor / robot.drives.reflected_inertia()

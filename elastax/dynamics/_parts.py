@@ -6,7 +6,7 @@ import numpy as np
 
 from .._custom_types import as_real
 from ..drivetrain import AbstractCounterbalance, DriveTrain
-from ..kinematics import JointKind, SerialChain
+from ..kinematics import SAME, JointKind, Placement, SerialChain, structured
 from ..structure import CubicStiffness, LinearStiffness
 from ._bodies import RigidBodies, no_bodies
 from ._inertia import check_inertia
@@ -25,11 +25,13 @@ class Offset:
     """Constant transform to the following part.
 
     Attributes:
-        position: [m], shape (3,).
-        rotation: shape (3, 3); identity unless given.
+        position: [m], shape (3,). Without one the parts lie in one place for good; a
+            position of zeros is a parameter of the assembled robot.
+        rotation: shape (3, 3); identity unless given. Right angles are structure,
+            anything else is a parameter of the assembled robot.
     """
 
-    position: object = (0.0, 0.0, 0.0)
+    position: object = None
     rotation: object = None
 
 
@@ -142,22 +144,23 @@ def assemble(
         ValueError: no axis, an unknown hinge, elastic joints in line with an axis and
             no inertia between them (the mass matrix is singular).
     """
-    rotation, position, axes, kinds, roles = [], [], [], [], []
+    joints, kinds, roles = [], [], []
     masses, coms, tensors, carriers, body_names = [], [], [], [], []
     springs, elastic_names, axis_names = [], [], []
     hinge_axes, slopes = {}, []
-    pose = np.eye(4)
+    place = SAME
     wrist, mark = None, False
     for part in parts:
         match part:
             case Offset():
-                pose = pose @ _pose(part)
+                place = place.then(_placement(part))
                 continue
             case Body():
                 if roles:  # others rest on the ground
-                    turn = pose[:3, :3]
+                    turn = place.rotation
+                    com = Placement(np.eye(3), np.asarray(part.com, float))
                     masses.append(np.asarray(part.mass, float))
-                    coms.append(turn @ np.asarray(part.com, float) + pose[:3, 3])
+                    coms.append(place.then(com).position)
                     tensors.append(turn @ np.asarray(part.inertia, float) @ turn.T)
                     carriers.append(len(roles) - 1)
                     body_names.append(part.name)
@@ -191,22 +194,23 @@ def assemble(
                 index, direction = hinge_axes[part.of]
                 kind, role = JointKind.REVOLUTE, SlopeRole(index, len(slopes))
                 slopes.append(part.factor)
-        rotation.append(pose[:3, :3])
-        position.append(pose[:3, 3])
-        axes.append(np.asarray(direction, float))
+        joints.append((place, np.asarray(direction, float)))
         kinds.append(kind)
         roles.append(role)
-        pose = np.eye(4)
+        place = SAME
     if not axis_names:
         raise ValueError(f"`{name}` has no driven axis: list at least one `Axis`")
     stiffness, damping, hardening = np.asarray(springs, float).reshape(-1, 3).T
+    flange = np.eye(4)
+    flange[:3, :3] = place.rotation
+    if place.position is not None:
+        flange[:3, 3] = place.position
     robot = ElasticRobot(
-        chain=SerialChain.from_frames(
-            np.stack(rotation),
-            np.stack(position),
-            np.stack(axes),
-            kinds=kinds,
-            tool=pose if tool is None else pose @ np.asarray(tool, float),
+        chain=SerialChain(
+            structured(joints),
+            np.eye(4),
+            flange if tool is None else flange @ np.asarray(tool, float),
+            tuple(kinds),
         ),
         bodies=RigidBodies(
             np.array(masses),
@@ -216,7 +220,7 @@ def assemble(
             tuple(body_names),
         ),
         payload=no_bodies(),
-        flange=pose,
+        flange=flange,
         slopes=np.asarray(slopes, float),
         structure_stiffness=_springs(stiffness, hardening),
         structure_damping=damping,
@@ -240,12 +244,11 @@ def assemble(
     return robot
 
 
-def _pose(part: Offset) -> np.ndarray:
-    pose = np.eye(4)
-    pose[:3, 3] = np.asarray(part.position, float)
-    if part.rotation is not None:
-        pose[:3, :3] = np.asarray(part.rotation, float)
-    return pose
+def _placement(part: Offset) -> Placement:
+    rotation = np.eye(3) if part.rotation is None else np.asarray(part.rotation, float)
+    if part.position is None:
+        return Placement(rotation, None)
+    return Placement(rotation, np.asarray(part.position, float))
 
 
 def _springs(stiffness: np.ndarray, hardening: np.ndarray):

@@ -10,10 +10,12 @@ $a_k = E_k^T (a_{k-1} + \dot\omega_{k-1} \times p_k + \omega_{k-1} \times (\omeg
 \times p_k))$,
 
 for turning joints, [Reiner2010] (2.27) and (2.31), with E_k and p_k the step from link
-k-1 to link k; a sliding joint adds to the acceleration instead. The bodies of a link
-count as one: its mass, first moment and inertia about the origin. It runs on arrays and
-on `Series`, which gives the time derivatives of the torques along a motion.
-`multibody` holds the same equations as sums of screws.
+k-1 to link k; a sliding joint adds to the acceleration instead. A point r of a link has
+the acceleration $a + W r$ with $W = \tilde{\dot\omega} + \tilde\omega\tilde\omega$,
+one matrix for the next origin and for all mass of the link, which counts as one body:
+its mass, first and second moment about the origin. It runs on arrays and on `Series`,
+which gives the time derivatives of the torques along a motion. `multibody` holds the
+same equations as sums of screws.
 """
 
 from typing import Any
@@ -21,7 +23,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from .._taylor import concatenate, cross, product
+from .._taylor import LEVI_CIVITA, concatenate, cross, leading, product, skew
 from ..kinematics import JointKind, joint_steps
 from ._robot import ElasticRobot
 
@@ -41,33 +43,50 @@ def _crossed(a, b):
     return None if a is None or b is None else cross(a, b)
 
 
-def _link_inertia(robot: ElasticRobot):
-    """Mass, first moment and inertia about the origin of every link with bodies."""
+def _link_moments(robot: ElasticRobot):
+    r"""Mass, first and second moment about the origin of every link with bodies.
+
+    The second moment $\int r r^T dm = \tfrac12 tr(I) 1 - I$ of the inertia I.
+    """
     bodies = robot.all_bodies()
     first = bodies.mass[:, None] * bodies.com
-    square = jnp.einsum("ka,kb->kab", bodies.com, first)
-    trace = jnp.einsum("kaa->k", square)
-    about = bodies.inertia + trace[:, None, None] * jnp.eye(3)[None] - square
+    half = 0.5 * jnp.einsum("kaa->k", bodies.inertia)
+    about_com = half[:, None, None] * jnp.eye(3)[None] - bodies.inertia
+    second = about_com + jnp.einsum("ka,kb->kab", bodies.com, first)
     links = {}
     for joint in sorted(set(bodies.joint)):
         here = np.flatnonzero(np.array(bodies.joint) == joint)
         links[joint] = tuple(
-            jnp.sum(x[here], axis=0) for x in (bodies.mass, first, about)
+            jnp.sum(x[here], axis=0) for x in (bodies.mass, first, second)
         )
     return links
 
 
-def _inertial(link, w, wd, a):
-    """Force and moment about the origin that move a link, [Reiner2010] (2.29)."""
-    mass, first, inertia = link
-    force = _sum(
-        product(",a->a", mass, a),
-        _crossed(wd, first),
-        _crossed(w, _crossed(w, first)),
+def _spreading(w, wd):
+    """Matrix W by which the acceleration differs over a link, `None` for zero."""
+    if w is None:
+        return None
+    square = product("a,b->ab", w, w)
+    identity = jnp.eye(3, dtype=leading(w).dtype)
+    total = product(",ab->ab", product("a,a->", w, w), identity)
+    return skew(wd) + square - total
+
+
+def _inertial(link, spreading, a):
+    r"""Force and moment about the origin that move a link, [Reiner2010] (2.29).
+
+    $\int (a + W r)\,dm$ and $\int r \times (a + W r)\,dm$.
+    """
+    mass, first, second = link
+    force, moment = product(",a->a", mass, a), cross(first, a)
+    if spreading is None:
+        return force, moment
+    turning = product("kl,lj->kj", spreading, second)
+    tensor = jnp.asarray(LEVI_CIVITA, leading(a).dtype)
+    return (
+        force + product("ab,b->a", spreading, first),
+        moment + product("ijk,kj->i", tensor, turning),
     )
-    spin = None if w is None else product("ab,b->a", inertia, w)
-    turning = None if wd is None else product("ab,b->a", inertia, wd)
-    return force, _sum(turning, _crossed(w, spin), cross(first, a))
 
 
 def generalised_forces(robot: ElasticRobot, q, eta, qd, etad, qdd, etadd):
@@ -88,13 +107,15 @@ def generalised_forces(robot: ElasticRobot, q, eta, qd, etad, qdd, etadd):
     coordinates = robot.joint_coordinates
     step, offset, axis = joint_steps(robot.chain, coordinates(q, eta))
     sd, sdd = coordinates(qd, etad), coordinates(qdd, etadd)
-    links = _link_inertia(robot)
+    links = _link_moments(robot)
     rotary = [kind is JointKind.REVOLUTE for kind in robot.chain.kinds]
 
-    w, wd, a = None, None, -robot.gravity
+    w, wd, a, spreading = None, None, -robot.gravity, None
     wrenches: list[Any] = []
     for k in range(robot.chain.number):
-        lever = _sum(_crossed(wd, offset[k]), _crossed(w, _crossed(w, offset[k])))
+        lever = None
+        if spreading is not None:
+            lever = product("ab,b->a", spreading, offset[k])
         a = _turned(step[k], _sum(a, lever))
         w, wd = _turned(step[k], w), _turned(step[k], wd)
         speed = product(",a->a", sd[k], axis[k])
@@ -103,7 +124,9 @@ def generalised_forces(robot: ElasticRobot, q, eta, qd, etad, qdd, etadd):
             w, wd = _sum(w, speed), _sum(wd, rate)
         else:
             a = _sum(a, rate, _crossed(w, speed))
-        wrenches.append(_inertial(links[k], w, wd, a) if k in links else (None, None))
+        spreading = _spreading(w, wd)
+        link = links.get(k)
+        wrenches.append((None, None) if link is None else _inertial(link, spreading, a))
 
     forces: list[Any] = []
     force = moment = None

@@ -2,7 +2,7 @@
 
 import jax.numpy as jnp
 
-from ..kinematics import FrameJoints, SerialChain
+from ..kinematics import SAME, Placement, SerialChain, placements, structured
 
 
 def locked_chain(chain: SerialChain, keep: tuple[int, ...]):
@@ -13,29 +13,29 @@ def locked_chain(chain: SerialChain, keep: tuple[int, ...]):
         keep: indices of the joints that go on moving, in order.
 
     Returns:
-        The new chain (joint frames) and the placement of the old links: for every old
-        joint the new joint that carries it (-1 for the ground), and the pose of the old
-        moving frame in the frame behind that joint, shape (joints, 4, 4).
+        The new chain (frames; what was structure stays structure) and the placement of
+        the old links: for every old joint the new joint that carries it (-1 for the
+        ground), and the pose of the old moving frame in the frame behind that joint,
+        shape (joints, 4, 4).
     """
-    frames = chain.joints.frames()
-    joints, poses, before = [], [], []
-    pose = chain.base  # of the current frame in the frame behind the last kept joint
+    dtype = chain.base.dtype
+    carriers, poses, joints = [], [], []
+    # of the current frame in the frame behind the last kept joint
+    place = Placement(chain.base[:3, :3], chain.base[:3, 3])
     carrier = -1
-    for k in range(chain.number):
-        pose = pose @ frames.before[k]
+    for k, (before, axis, after) in enumerate(placements(chain.joints)):
+        place = place.then(before)
         if k in keep:
-            before.append(pose)
-            pose = jnp.eye(4, dtype=pose.dtype)
+            joints.append((place, axis))
+            place = SAME
             carrier += 1
-        joints.append(carrier)
-        poses.append(pose)
-        pose = pose @ frames.after[k]
-    before = jnp.stack(before)
-    index = jnp.array(keep)
+        carriers.append(carrier)
+        poses.append(place.matrix(dtype))
+        place = place.then(after)
     new = SerialChain(
-        FrameJoints(before[:, :3, :3], before[:, :3, 3], frames.axis[index]),
-        jnp.eye(4, dtype=pose.dtype),
-        pose @ chain.tool,
+        structured(joints),
+        jnp.eye(4, dtype=dtype),
+        place.matrix(dtype) @ chain.tool,
         tuple(chain.kinds[k] for k in keep),
     )
-    return new, (tuple(joints), jnp.stack(poses))
+    return new, (tuple(carriers), jnp.stack(poses))

@@ -6,8 +6,8 @@ from .._custom_types import PerElastic, PerJoint
 from .._kernel import kernel
 from .._taylor import leading
 from ..kinematics import moving_frames, transform
-from ._newton_euler import chain_motion, joint_screws
 from ._robot import ElasticRobot
+from ._screws import chain_motion, joint_screws
 
 
 @kernel

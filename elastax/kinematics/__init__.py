@@ -55,3 +55,11 @@ from ._se3 import (
     rotation_z as rotation_z,
     transform as transform,
 )
+from ._structured import (
+    SAME as SAME,
+    JointStructure as JointStructure,
+    Placement as Placement,
+    StructuredJoints as StructuredJoints,
+    placements as placements,
+    structured as structured,
+)

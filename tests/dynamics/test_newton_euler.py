@@ -15,7 +15,7 @@ from elastax.dynamics import (
     multibody,
     potential_energy,
 )
-from elastax.dynamics._newton_euler import forces_by_screws
+from elastax.dynamics._screws import forces_by_screws
 from elastax.robots import kr210
 
 from tests import systems
