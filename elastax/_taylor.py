@@ -159,6 +159,13 @@ def concatenate(parts: Any, axis: int = 0) -> Any:
     return jnp.concatenate(parts, axis=axis)
 
 
+def stack(parts: Any, axis: int = 0) -> Any:
+    """`jnp.stack` of arrays, or of series of equal order."""
+    if isinstance(parts[0], Series):
+        return Series(jnp.stack([p.coefficients for p in parts], axis=axis + 1))
+    return jnp.stack(parts, axis=axis)
+
+
 LEVI_CIVITA = np.zeros((3, 3, 3))
 for _i, _j, _k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
     LEVI_CIVITA[_i, _j, _k] = 1.0

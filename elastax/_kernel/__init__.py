@@ -13,5 +13,4 @@ export, untested versions of jaxlib) the definition runs as it is written.
 from ._decorator import kernel as kernel, written_out as written_out
 from ._emit import kernels_supported as kernels_supported
 from ._graph import NotScalarError as NotScalarError
-from ._parts import kernel_in_parts as kernel_in_parts, moving_jvp as moving_jvp
 from ._program import Program as Program

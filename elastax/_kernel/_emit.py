@@ -23,6 +23,7 @@ from jaxlib.mlir.dialects import func, mhlo, stablehlo as hlo
 
 from ._graph import NotScalarError
 from ._program import Program
+from ._stages import depends, stages
 
 
 _TESTED = ((0, 10, 2), (0, 11, 0))  # first jaxlib, and the first that is not tested
@@ -121,10 +122,11 @@ _OPERATIONS: dict[str, Callable] = {
 
 
 class _Kernel:
-    """Emits the loops and the fusion of one program.
+    """Emits the loops and the fusions of one program.
 
-    The axis along which most data change is the outermost loop; what does not change in
-    an inner loop, LLVM moves out of it.
+    The axis on which most operations depend is the outermost loop; what does not change
+    in a loop is computed in front of it (`_stages`). Rows (1, n) hold the elements of
+    an operand for one sample, or the values that one stage hands to the loops inside.
     """
 
     def __init__(
@@ -145,12 +147,30 @@ class _Kernel:
         inputs = [n for n in needed if self.graph.names[n] == "input"]
         # operands that matter; XLA refuses empty ones here
         self.used = sorted({self._place_of(n)[0] for n in inputs})
-        changing = [
-            sum(size for size, s in zip(self.sizes, shapes) if s[level] > 1)
-            for level in range(len(levels))
-        ]
         axes = [level for level, size in enumerate(levels) if size > 1]
-        self.axes = sorted(axes, key=lambda level: -changing[level])
+        self.axes = sorted(axes, key=lambda level: -self._dependent(level))
+        self.stages = stages(
+            self.graph,
+            self.results,
+            lambda n: self._depth_of(self._place_of(n)[0]),
+            len(self.axes),
+        )
+        # what is handed in, found by its place in the row of its stage
+        self.handed = {
+            node: (("stage", d), j)
+            for d, nodes in enumerate(self.stages.handed)
+            for j, node in enumerate(nodes)
+        }
+
+    def _dependent(self, level: int) -> int:
+        """Operations that change along a batch axis."""
+        changes = lambda n: self.shapes[self._place_of(n)[0]][level] > 1
+        return len(depends(self.graph, self.results, changes))
+
+    def _depth_of(self, k: int) -> int:
+        """Number of loops within which an operand changes."""
+        changing = [self.shapes[k][level] > 1 for level in self.axes]
+        return max((d + 1 for d, yes in enumerate(changing) if yes), default=0)
 
     def _place_of(self, node: int) -> tuple[int, int]:
         return self.where[self.graph.operands[node][0]]
@@ -184,47 +204,45 @@ class _Kernel:
 
     def emit(self, operands: Sequence[Any]) -> Any:
         """All results of the whole batch, (batch, results)."""
-        # in a function of its own: XLA would draw operations around it into the fusion
-        rows = [_tensor((1, self.sizes[k]), self.dtype) for k in self.used]
-        row = _tensor((1, len(self.results)), self.dtype)
-        sample = self.add_function("sample", ir.FunctionType.get(rows, [row]))
-        with ir.InsertionPoint(sample.add_entry_block()):
-            column = self._column(dict(zip(self.used, sample.arguments)))
-            func.ReturnOp([hlo.reshape(row, column)])
-        if not self.axes:
-            return _call(sample, list(operands))
-        whole = _literal(0, self.result_shape(), self.dtype)
-        starts = dict(zip(self.used, np.cumsum([0, *self._lengths()]).tolist()))
-        fixed = [k for k in self.used if math.prod(self.shapes[k]) == 1]
-        kept = [self._row(k, operands[0], starts[k], []) for k in fixed]
-        self._rows = lambda vector, kept, counters: [
-            kept[fixed.index(k)]
-            if k in fixed
-            else self._row(k, vector, starts[k], counters)
-            for k in self.used
+        functions = [
+            self._stage(d, nodes)
+            for d, nodes in enumerate([*self.stages.handed, self.results])
         ]
-        return self._loop(sample, [*operands, *kept], [], whole)
+        if not self.axes:
+            rows: dict[Any, Any] = dict(zip(self.used, operands))
+            return self._run(functions[0], rows)
+        self.functions = functions
+        self.starts = dict(zip(self.used, np.cumsum([0, *self._lengths()]).tolist()))
+        whole = _literal(0, self.result_shape(), self.dtype)
+        return self._within(dict(zip(["vector"], operands)), [], whole)
 
-    def _loop(self, sample, operands, counters, whole):
-        """The loops that are still to come, and the sample inside."""
-        if len(counters) == len(self.axes):
-            rows = self._rows(operands[0], operands[1:], counters) if operands else []
+    def _within(self, rows: dict[Any, Any], counters: list[Any], whole: Any) -> Any:
+        """What stands inside the loops that are open: rows, a stage, the next loop."""
+        depth = len(counters)
+        rows = dict(rows)
+        for k in self.used:
+            if self._depth_of(k) == depth:
+                rows[k] = self._row(k, rows["vector"], counters)
+        if depth == len(self.axes):
             place = self._place(self.levels, counters)
-            return hlo.dynamic_update_slice(whole, _call(sample, rows), place)
-        carried = [_literal(0, (), "int64"), whole, *counters, *operands]
+            sample = self._run(self.functions[depth], rows)
+            return hlo.dynamic_update_slice(whole, sample, place)
+        if self.stages.handed[depth]:
+            rows[("stage", depth)] = self._run(self.functions[depth], rows)
+        carried = [_literal(0, (), "int64"), whole, *counters, *rows.values()]
         types = [c.type for c in carried]
         loop = hlo.WhileOp(types, carried)
         test = loop.regions[0].blocks.append(*types)
         with ir.InsertionPoint(test):
-            limit = _literal(self.levels[self.axes[len(counters)]], (), "int64")
+            limit = _literal(self.levels[self.axes[depth]], (), "int64")
             hlo.return_([_compare("LT")(test.arguments[0], limit)])
         body = loop.regions[1].blocks.append(*types)
         with ir.InsertionPoint(body):
             counter, inner, *rest = body.arguments
-            outer, inputs = rest[: len(counters)], rest[len(counters) :]
-            inner = self._loop(sample, inputs, [*outer, counter], inner)
+            outer, values = rest[:depth], rest[depth:]
+            inner = self._within(dict(zip(rows, values)), [*outer, counter], inner)
             step = hlo.add(counter, _literal(1, (), "int64"))
-            hlo.return_([step, inner, *outer, *inputs])
+            hlo.return_([step, inner, *outer, *values])
         return loop.results[1]
 
     def _place(self, extent, counters):
@@ -236,28 +254,74 @@ class _Kernel:
                 place = hlo.add(scaled, counters[self.axes.index(level)])
         return [place, zero]
 
-    def _row(self, k, vector, start, counters):
+    def _row(self, k, vector, counters):
         """Row (1, size) of an operand from the vector of all operands."""
         size = self.sizes[k]
         place, _ = self._place(self.shapes[k], counters)
         place = hlo.multiply(place, _literal(size, (), "int64"))
-        place = hlo.add(place, _literal(start, (), "int64"))
+        place = hlo.add(place, _literal(self.starts[k], (), "int64"))
         part = hlo.dynamic_slice(vector, [place], _dims(size))
         return hlo.reshape(_tensor((1, size), self.dtype), part)
 
-    def _column(self, rows: dict[int, Any]) -> Any:
-        """Results of one sample, (results, 1), from the rows of its operands."""
-        values = {n: self._given(n, rows) for n in set(self.results)}
+    def _stage(self, depth: int, nodes: list[int]) -> Any:
+        """Function from the rows that a stage reads to the row of its nodes."""
+        if not nodes:
+            return None
+        read = self._read(depth, self._order(depth, nodes))
+        # in a function of its own: XLA would draw operations around it into the fusion
+        row = _tensor((1, len(nodes)), self.dtype)
+        types = [_tensor((1, self._width(key)), self.dtype) for key in read]
+        signature = ir.FunctionType.get(types, [row])
+        function = self.add_function(f"stage_{depth}", signature)
+        with ir.InsertionPoint(function.add_entry_block()):
+            rows = dict(zip(read, function.arguments))
+            func.ReturnOp([hlo.reshape(row, self._column(depth, rows, nodes))])
+        return function, read
+
+    def _run(self, stage: Any, rows: dict[Any, Any]) -> Any:
+        function, read = stage
+        return _call(function, [rows[key] for key in read])
+
+    def _width(self, key: Any) -> int:
+        if isinstance(key, tuple):
+            return len(self.stages.handed[key[1]])
+        return self.sizes[key]
+
+    def _order(self, depth: int, nodes: list[int]) -> list[int]:
+        """Nodes that a stage computes or reads, operands first."""
+        seen: set[int] = set()
+        stack = list(nodes)
+        while stack:
+            node = stack.pop()
+            if node in seen:
+                continue
+            seen.add(node)
+            given = self.graph.names[node] in ("constant", "input")
+            if not given and self.stages.depth[node] == depth:
+                stack.extend(self.graph.operands[node])
+        return sorted(seen)
+
+    def _read(self, depth: int, order: list[int]) -> list[Any]:
+        """Rows that a stage reads."""
+        sources = [self._source(n) for n in order]
+        keys = {s[0] for s in sources if s is not None}
+        return sorted(keys - {("stage", depth)}, key=str)
+
+    def _source(self, node: int) -> tuple[Any, int] | None:
+        """Row and place of an input or of a value that is handed in."""
+        if self.graph.names[node] == "input":
+            return self._place_of(node)
+        return self.handed.get(node)
+
+    def _column(self, depth: int, rows: dict[Any, Any], nodes: list[int]) -> Any:
+        """Values of the nodes of one stage, (nodes, 1), from the rows that it reads."""
+        values = {n: self._given(n, rows) for n in set(nodes)}
         # what is only passed on does not go through the fusion: XLA would abort
         made = [n for n, value in values.items() if value is None]
         if made:
-            read = {
-                self._place_of(n)[0]
-                for n in self.graph.needed(made)
-                if self.graph.names[n] == "input"
-            }
-            rows = {k: row for k, row in rows.items() if k in read}
-            inputs = list(rows.values())
+            order = self._order(depth, made)
+            read = self._read(depth, order)
+            inputs = [rows[key] for key in read]
             fusion = mhlo.FusionOp(
                 [_tensor((1, 1), self.dtype)] * len(made),
                 inputs,
@@ -265,20 +329,16 @@ class _Kernel:
             )
             block = fusion.operation.regions[0].blocks.append(*[x.type for x in inputs])
             with ir.InsertionPoint(block):
-                mhlo.ReturnOp(self._scalars(dict(zip(rows, block.arguments)), made))
+                inside = dict(zip(read, block.arguments))
+                mhlo.ReturnOp(self._scalars(inside, order, made))
             values.update(zip(made, fusion.operation.results))
-        columns: list[Any] = [values[node] for node in self.results]
-        if len(columns) == 1:
-            return columns[0]
-        return hlo.concatenate(
-            columns, ir.IntegerAttr.get(_ELEMENT_TYPES["int64"](), 0)
-        )
+        return _joined([values[node] for node in nodes])
 
-    def _scalars(self, rows, made):
+    def _scalars(self, rows, order, made):
         """Values of the nodes `made`, inside the fusion."""
         graph = self.graph
         values: dict[int, Any] = {}
-        for node in graph.needed(made):
+        for node in order:
             value = self._given(node, rows)
             if value is None:
                 operands = [values[i] for i in graph.operands[node]]
@@ -291,16 +351,16 @@ class _Kernel:
         return [values[node] for node in made]
 
     def _given(self, node, rows):
-        """Constant or input, (1, 1); `None` for a node that is computed."""
-        name = self.graph.names[node]
-        if name == "constant":
+        """Constant, input or value handed in, (1, 1); `None` for one to compute."""
+        if self.graph.names[node] == "constant":
             return _literal(
                 self.graph.operands[node][0], (1, 1), self.graph.dtypes[node]
             )
-        if name == "input":
-            k, j = self._place_of(node)
-            return hlo.slice(rows[k], _dims(0, j), _dims(1, j + 1), _dims(1, 1))
-        return None
+        source = self._source(node)
+        if source is None or source[0] not in rows:
+            return None
+        key, j = source
+        return hlo.slice(rows[key], _dims(0, j), _dims(1, j + 1), _dims(1, 1))
 
 
 def _joined(parts: list[Any]) -> Any:

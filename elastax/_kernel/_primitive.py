@@ -11,7 +11,7 @@ import jax
 import jax.core
 import jax.numpy as jnp
 from jax.extend.core import Primitive
-from jax.interpreters import ad, batching, mlir
+from jax.interpreters import ad, batching, mlir, partial_eval
 
 from ._emit import emit_kernel, kernels_supported
 from ._graph import NotScalarError
@@ -130,10 +130,27 @@ def _lower_on_cpu(ctx, *operands, program, levels):
     return _lower_written_out(ctx, *operands, program=program, levels=levels)
 
 
+def _leave_out(wanted, equation):
+    """Equation without results that nobody reads, as `jax.jit` asks for it."""
+    if not any(wanted):
+        return [False] * len(equation.invars), None
+    if all(wanted):
+        return [True] * len(equation.invars), equation
+    derived = equation.params["program"].pruned(tuple(wanted))
+    fewer = equation.replace(
+        invars=derived.select(equation.invars),
+        outvars=[var for var, yes in zip(equation.outvars, wanted) if yes],
+        params=equation.params | {"program": derived.program},
+    )
+    read = set(derived.read)
+    return [k in read for k in range(len(equation.invars))], fewer
+
+
 kernel_p.def_abstract_eval(_abstract)
 kernel_p.def_impl(_evaluate)
 batching.primitive_batchers[kernel_p] = _batch
 ad.primitive_jvps[kernel_p] = _push
 ad.primitive_transposes[kernel_p] = _pull
+partial_eval.dce_rules[kernel_p] = _leave_out
 mlir.register_lowering(kernel_p, _lower_written_out)
 mlir.register_lowering(kernel_p, _lower_on_cpu, platform="cpu")

@@ -28,6 +28,7 @@ class Program:
         self.name = name
         self._tangents: dict[tuple, Derived] = {}
         self._transposed: dict[tuple, Derived] = {}
+        self._pruned: dict[tuple, Derived] = {}
 
     def __repr__(self) -> str:
         return f"Program({self.name})"
@@ -76,6 +77,13 @@ class Program:
             )
         return self._tangents[moving]
 
+    def pruned(self, wanted: tuple[bool, ...]) -> "Derived":
+        """Program of the wanted results only."""
+        if wanted not in self._pruned:
+            pruned = _without_unread(self.closed, list(wanted), self.name)
+            self._pruned[wanted] = pruned
+        return self._pruned[wanted]
+
     def transposed(self, linear: tuple[bool, ...]) -> "Derived":
         """Program of (other inputs, cotangents) to the linear inputs' cotangents."""
         if linear not in self._transposed:
@@ -122,6 +130,11 @@ class Derived(NamedTuple):
 def derive(function: Any, avals: Any, name: str) -> Derived:
     """Program of a function, without the arguments on which it does not depend."""
     closed = trace(function, avals, name).closed
-    jaxpr, used = dce_jaxpr(closed.jaxpr, [True] * len(closed.out_avals))
+    return _without_unread(closed, [True] * len(closed.out_avals), name)
+
+
+def _without_unread(closed: ClosedJaxpr, wanted: list[bool], name: str) -> Derived:
+    """Program of the wanted results of a jaxpr, and what it reads."""
+    jaxpr, used = dce_jaxpr(closed.jaxpr, wanted)
     read = [k for k, yes in enumerate(used) if yes]
     return Derived(Program(ClosedJaxpr(jaxpr, closed.consts), name), read)

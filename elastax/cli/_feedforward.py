@@ -1,5 +1,6 @@
 """`elastax feedforward`: the main job."""
 
+import concurrent.futures
 import dataclasses
 import pathlib
 import sys
@@ -163,20 +164,27 @@ def compile_programs(
 ) -> Compiled:
     """Compile the feed-forwards and the plant for one length of motion."""
     start = time.perf_counter()
-    inverses, command = {}, None
-    for name in names:
-        progress.say(f"compiling the {name} feed-forward ...")
-        inverse = INVERSES[name]
-        program = jax.jit(lambda m, r, inverse=inverse: inverse.feedforward(m, r))
-        inverses[name] = program.lower(robot, reference).compile()
-    command = bare(inverses[names[0]](robot, reference))
-    progress.say("compiling the elastic plant ...")
+    first = INVERSES[names[0]]
+    command = jax.eval_shape(
+        lambda m, r: bare(first.feedforward(m, r)), robot, reference
+    )
     controller = CascadeMotorControl()
     # a failed simulation shows in its figures; an error raised from inside the program
     # would keep it out of the persistent cache
-    plant = jax.jit(lambda p, c, r: run_command(p, c, r, controller, throw=False))
-    compiled = plant.lower(robot, command, reference).compile()
-    return Compiled(inverses, compiled, time.perf_counter() - start)
+    plant = lambda p, c, r: run_command(p, c, r, controller, throw=False)
+    jobs = {"elastic plant": (plant, robot, command, reference)}
+    for name in names:
+        inverse = INVERSES[name].feedforward
+        jobs[f"{name} feed-forward"] = (inverse, robot, reference)
+    # tracing takes Python, compiling does not: several at once
+    with concurrent.futures.ThreadPoolExecutor() as pool:
+        pending = []
+        for what, (function, *args) in jobs.items():
+            progress.say(f"compiling the {what} ...")
+            lowered = jax.jit(lambda *x, f=function: f(*x)).lower(*args)
+            pending.append(pool.submit(lowered.compile))
+        compiled, *inverses = [job.result() for job in pending]
+    return Compiled(dict(zip(names, inverses)), compiled, time.perf_counter() - start)
 
 
 def bare(command: MotorCommand) -> MotorCommand:

@@ -24,11 +24,7 @@ from ._equilibrium import (
     static_equilibrium as static_equilibrium,
 )
 from ._lagrange import lagrange_forces as lagrange_forces
-from ._linearised import (
-    LinearisedBodies as LinearisedBodies,
-    body_accelerations as body_accelerations,
-    linearised_bodies as linearised_bodies,
-)
+from ._linearised import body_accelerations as body_accelerations
 from ._newton_euler import inverse_dynamics as inverse_dynamics
 from ._parts import (
     Axis as Axis,

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._custom_types import PerElastic, PerJoint
-from .._kernel import kernel, kernel_in_parts
+from .._kernel import kernel
 from ._forces import applied_forces
 from ._linearised import body_accelerations
 from ._robot import ElasticRobot
@@ -101,7 +101,7 @@ def _loads(robot: ElasticRobot, q, eta, theta, qd, etad, thetad, tau_m):
     return jnp.concatenate([-joint - gear, -structure]), motor
 
 
-@kernel_in_parts
+@kernel
 def forward_dynamics(
     robot: ElasticRobot,
     q: PerJoint,

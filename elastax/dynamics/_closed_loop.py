@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._custom_types import PerJoint
-from .._kernel import kernel, kernel_in_parts
+from .._kernel import kernel
 from ._block_form import forward_dynamics
 from ._command import MotorSetpoint
 from ._robot import ElasticRobot
@@ -55,7 +55,6 @@ class AbstractMotorController(eqx.Module):
 State = Float[Array, " states"]
 
 
-@kernel
 def _driven(robot: ElasticRobot, controller, setpoint: MotorSetpoint, x: State):
     """State in parts, motor torques, torques of the gears on the motors."""
     n, m = robot.axes, robot.elastic
@@ -68,7 +67,7 @@ def _driven(robot: ElasticRobot, controller, setpoint: MotorSetpoint, x: State):
     return (q, eta, theta, qd, etad, thetad), tau_m, gear
 
 
-@kernel_in_parts
+@kernel
 def rates(
     robot: ElasticRobot,
     controller: AbstractMotorController,
@@ -88,7 +87,7 @@ def rates(
     return jnp.concatenate([*state[3:], *accelerations])
 
 
-@kernel_in_parts
+@kernel
 def observe(
     robot: ElasticRobot,
     controller: AbstractMotorController,

@@ -22,9 +22,9 @@ from jaxtyping import Array, Float
 
 from .._custom_types import PerElastic, Scalar
 from .._kernel import kernel
-from .._taylor import Series, from_derivatives, leading
+from .._taylor import Series, from_derivatives
 from ..dynamics import ElasticRobot, MotorCommand, MotorSample, inverse_dynamics
-from ..kinematics import CorrectionLimiter, SigmoidDamping, moving_frames
+from ..kinematics import CorrectionLimiter, SigmoidDamping
 from ..signals import Reference
 from ._base import AbstractInverse, Derivatives, check_reference, samples_of
 from ._correction import AbstractCorrection, PositionCorrection, correct
@@ -153,7 +153,7 @@ class ASIM(AbstractInverse):
 
 @kernel
 def _jacobian(correction: AbstractCorrection, model: ElasticRobot, q, eta):
-    return correction.linearised(model, q, eta, correction_target(model, q))[0]
+    return correction.linearised(model, q, eta, correction.target(model, q))[0]
 
 
 @kernel
@@ -190,12 +190,6 @@ def structure_torque(model: ElasticRobot, sample: Derivatives) -> Series:
     qd, qdd = q.rate(), q.rate().rate()
     _, force = inverse_dynamics(model, q.truncated(2), qd.truncated(2), qdd)
     return -force
-
-
-def correction_target(model: ElasticRobot, q):
-    """Moving frames of the undeformed robot at the joint angles `q`."""
-    eta = jnp.zeros((model.elastic,), leading(q).dtype)
-    return moving_frames(model.chain, model.joint_coordinates(q, eta))
 
 
 def resting_deformation(model: ElasticRobot, forcing: Series) -> PerElastic:

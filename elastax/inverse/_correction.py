@@ -20,6 +20,7 @@ from ..kinematics import (
     row_weights,
     smallest_singular_value,
     tool_jacobian,
+    tool_levers,
 )
 
 
@@ -27,15 +28,19 @@ class AbstractCorrection(eqx.Module):
     """Which error of the tool is corrected, and by which axes."""
 
     @abc.abstractmethod
+    def target(self, model: ElasticRobot, q: Any) -> Any:
+        """What the tool of the undeformed robot has to keep at the joint angles `q`."""
+
+    @abc.abstractmethod
     def linearised(
-        self, model: ElasticRobot, q: Any, eta: Any, target: MovingFrames
+        self, model: ElasticRobot, q: Any, eta: Any, target: Any
     ) -> tuple[Any, Any]:
         """Jacobian and error of the deformed robot at (q, eta), in one unit.
 
         Args:
             model: the robot.
             q, eta: joint angles and deformations, arrays or series.
-            target: moving frames of the undeformed robot on the reference.
+            target: what `target` gave on the reference.
 
         Returns:
             Jacobian (rows, moving axes) and error (rows,), target minus actual [m].
@@ -62,11 +67,18 @@ class PositionCorrection(AbstractCorrection):
 
     axes: tuple[int, ...] = eqx.field(static=True, default=(0, 1, 2))
 
+    def target(self, model: ElasticRobot, q: Any) -> Any:
+        return self._levers(model, q, _undeformed(model, q))[0]
+
     def linearised(
-        self, model: ElasticRobot, q: Any, eta: Any, target: MovingFrames
+        self, model: ElasticRobot, q: Any, eta: Any, target: Any
     ) -> tuple[Any, Any]:
-        jacobian, frames = _deformed(model, q, eta, self.axes)
-        return jacobian[:3], target.tool_position - frames.tool_position
+        position, jacobian = self._levers(model, q, eta)
+        return jacobian, target - position
+
+    def _levers(self, model: ElasticRobot, q: Any, eta: Any):
+        joints = _driven_joints(model, self.axes)
+        return tool_levers(model.chain, model.joint_coordinates(q, eta), joints)
 
     def spread(self, model: ElasticRobot, correction: Any) -> Any:
         return _spread(model, correction, self.axes)
@@ -95,10 +107,15 @@ class PoseCorrection(AbstractCorrection):
         length = self.characteristic_length
         check_values("`characteristic_length` must be positive [m]", length, length > 0)
 
+    def target(self, model: ElasticRobot, q: Any) -> Any:
+        return _frames(model, q, _undeformed(model, q))
+
     def linearised(
-        self, model: ElasticRobot, q: Any, eta: Any, target: MovingFrames
+        self, model: ElasticRobot, q: Any, eta: Any, target: Any
     ) -> tuple[Any, Any]:
-        jacobian, frames = _deformed(model, q, eta, tuple(range(model.axes)))
+        frames = _frames(model, q, eta)
+        columns = np.array(_driven_joints(model, tuple(range(model.axes))), int)
+        jacobian = tool_jacobian(model.chain, frames)[:, columns]
         relative = product("ab,cb->ac", target.tool_rotation, frames.tool_rotation)
         turn = linear(_half_vee, relative)
         error = concatenate([target.tool_position - frames.tool_position, turn])
@@ -135,7 +152,7 @@ def correct(
     References:
         [Reiner2010] (3.85) with the sign of the errata, (3.86), (3.71).
     """
-    target = _frames(model, q, _zero_like(eta))
+    target = correction.target(model, q)
     moved = q
     for _ in range(iterations):
         jacobian, error = correction.linearised(model, moved, eta, target)
@@ -145,26 +162,25 @@ def correct(
     return total if limiter is None else compose(limiter, total)
 
 
-def _zero_like(x):
-    if isinstance(x, Series):
-        return Series(jnp.zeros_like(x.coefficients))
-    return jnp.zeros_like(x)
+def _undeformed(model: ElasticRobot, q):
+    """Deformations of zero, of the kind of `q`."""
+    if isinstance(q, Series):
+        return Series(jnp.zeros((q.order + 1, model.elastic), leading(q).dtype))
+    return jnp.zeros((model.elastic,), q.dtype)
 
 
-def _frames(model: ElasticRobot, q, eta):
+def _frames(model: ElasticRobot, q, eta) -> MovingFrames:
     return moving_frames(model.chain, model.joint_coordinates(q, eta))
 
 
-def _deformed(model: ElasticRobot, q, eta, axes: tuple[int, ...]):
-    frames = _frames(model, q, eta)
+def _driven_joints(model: ElasticRobot, axes: tuple[int, ...]) -> tuple[int, ...]:
+    """Joints of the chain that the axes drive."""
     driven = {
         role.index: joint
         for joint, role in enumerate(model.roles)
         if isinstance(role, AxisRole)
     }
-    columns = np.array([driven[axis] for axis in axes], int)
-    jacobian = tool_jacobian(model.chain, frames)
-    return jacobian[:, columns], frames
+    return tuple(driven[axis] for axis in axes)
 
 
 def _spread(model: ElasticRobot, correction, axes: tuple[int, ...]):

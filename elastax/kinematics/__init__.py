@@ -35,6 +35,7 @@ from ._jacobian import (
     jacobian as jacobian,
     jacobian_derivatives as jacobian_derivatives,
     tool_jacobian as tool_jacobian,
+    tool_levers as tool_levers,
     tool_motion as tool_motion,
 )
 from ._joints import (

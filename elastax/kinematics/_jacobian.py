@@ -7,8 +7,8 @@ from jaxtyping import Array, Float
 
 from .._custom_types import PerJoint
 from .._kernel import kernel
-from .._taylor import concatenate, cross, from_derivatives, leading, product
-from ._chain import MovingFrames, SerialChain, moving_frames
+from .._taylor import concatenate, cross, from_derivatives, leading, product, stack
+from ._chain import MovingFrames, SerialChain, joint_steps, moving_frames
 from ._joints import JointKind
 
 
@@ -41,6 +41,37 @@ def tool_jacobian(chain: SerialChain, frames: MovingFrames):
     sliding = product("ka,kb->ka", frames.axis, 1 - rotary)
     columns = concatenate([lever + sliding, turning], axis=1)
     return product("ij,kj->ik", jnp.asarray(np.eye(6), rotary.dtype), columns)
+
+
+def tool_levers(chain: SerialChain, q, joints: tuple[int, ...]):
+    """Position of the tool and its derivatives by some joints, without link frames.
+
+    From the tool to the base: a vector is turned by one joint after another. Where only
+    positions are asked for, this takes a third of the operations of `moving_frames`.
+
+    Args:
+        chain: the chain.
+        q: joint coordinates, array or series.
+        joints: the joints whose columns are wanted.
+
+    Returns:
+        Position (3,) [m] and columns (3, len(joints)) of the Jacobian [m/rad], in the
+        base frame.
+
+    References:
+        [Reiner2010] (2.26), (3.54).
+    """
+    step, offset, axis = joint_steps(chain, q)
+    last = chain.joints.frames().after[-1] @ chain.tool
+    point, columns = last[:3, 3], {}
+    for k in reversed(range(chain.number)):
+        turned = lambda x: product("ab,b->a", step[k], x)
+        if k in joints:
+            rotary = chain.kinds[k] is JointKind.REVOLUTE
+            columns[k] = cross(axis[k], point) if rotary else axis[k]
+        point = turned(point) + offset[k]
+        columns = {j: turned(column) for j, column in columns.items()}
+    return point, stack([columns[j] for j in joints], axis=1)
 
 
 @kernel
