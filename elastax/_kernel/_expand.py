@@ -191,16 +191,18 @@ def _dot_general(graph, operands, dtype, params):
     a, b = (_convert(graph, [x], dtype) for x in operands)
     left = matrices(a, lb, lc, True)
     right = matrices(b, rb, rc, True)
+    # most factors are zeros that are known: those products are not even looked up
+    zeros = {n for n in {*left.flat, *right.flat} if graph.is_constant(n, 0)}
+
+    def entry(row, column):
+        pairs = zip(row, column)
+        kept = [(x, y) for x, y in pairs if x not in zeros and y not in zeros]
+        return graph.total((graph.multiply(x, y) for x, y in kept), dtype)
+
     out = np.array(
         [
-            [
-                [
-                    graph.total(map(graph.multiply, row, column), dtype)
-                    for column in right[k].tolist()
-                ]
-                for row in left[k].tolist()
-            ]
-            for k in range(left.shape[0])
+            [[entry(row, column) for column in right[k].tolist()] for row in rows]
+            for k, rows in enumerate(left.tolist())
         ],
         np.int64,
     )

@@ -81,6 +81,15 @@ class Graph:
         self.dtypes: list[str] = []
         self.values: dict[int, Any] = {}
         self._known: dict[tuple, int] = {}
+        self._special: dict[str, Callable] = {
+            "add": self._add,
+            "sub": self._sub,
+            "neg": self._neg,
+            "mul": self._mul,
+            "div": self._div,
+            "select": self._select,
+            "convert": self._convert,
+        }
 
     def _node(self, name: str, operands: tuple, dtype: str) -> int:
         key = (name, operands, dtype)
@@ -125,10 +134,12 @@ class Graph:
 
     def apply(self, name: str, *operands: int, dtype: str) -> int:
         """Node of an operation, after folding."""
-        fold = _FOLDS.get(name)
-        if fold is not None and all(i in self.values for i in operands):
-            return self.constant(fold(*(self.values[i] for i in operands)), dtype)
-        special = getattr(self, "_" + name, None)
+        values = self.values
+        if all(i in values for i in operands):
+            fold = _FOLDS.get(name)
+            if fold is not None:
+                return self.constant(fold(*(values[i] for i in operands)), dtype)
+        special = self._special.get(name)
         if special is not None:
             return special(*operands, dtype)
         return self._node(name, operands, dtype)
@@ -146,13 +157,14 @@ class Graph:
             result = node if result is None else self.add(result, node)
         return self.constant(0, dtype) if result is None else result
 
-    def _is(self, node: int, value: float) -> bool:
+    def is_constant(self, node: int, value: float) -> bool:
+        """Whether a node is this number."""
         return node in self.values and bool(self.values[node] == value)
 
     def _add(self, a: int, b: int, dtype: str) -> int:
-        if self._is(a, 0):
+        if self.is_constant(a, 0):
             return b
-        if self._is(b, 0):
+        if self.is_constant(b, 0):
             return a
         if self.names[b] == "neg":
             return self.apply("sub", a, self.operands[b][0], dtype=dtype)
@@ -161,9 +173,9 @@ class Graph:
         return self._node("add", (min(a, b), max(a, b)), dtype)
 
     def _sub(self, a: int, b: int, dtype: str) -> int:
-        if self._is(b, 0):
+        if self.is_constant(b, 0):
             return a
-        if self._is(a, 0):
+        if self.is_constant(a, 0):
             return self.apply("neg", b, dtype=dtype)
         if self.names[b] == "neg":
             return self.apply("add", a, self.operands[b][0], dtype=dtype)
@@ -179,20 +191,21 @@ class Graph:
     def _mul(self, a: int, b: int, dtype: str) -> int:
         if b in self.values:
             a, b = b, a
-        if self._is(a, 0):
+        if self.is_constant(a, 0):
             return a
-        if self._is(a, 1):
+        if self.is_constant(a, 1):
             return b
-        if self._is(a, -1):
+        if self.is_constant(a, -1):
             return self.apply("neg", b, dtype=dtype)
-        for x, y in ((a, b), (b, a)):
-            if self.names[x] == "neg":
-                inner = self.apply("mul", self.operands[x][0], y, dtype=dtype)
-                return self.apply("neg", inner, dtype=dtype)
-        return self._node("mul", (min(a, b), max(a, b)), dtype)
+        names = self.names
+        if names[a] == "neg" or names[b] == "neg":
+            x, y = (a, b) if names[a] == "neg" else (b, a)
+            inner = self.apply("mul", self.operands[x][0], y, dtype=dtype)
+            return self.apply("neg", inner, dtype=dtype)
+        return self._node("mul", (a, b) if a < b else (b, a), dtype)
 
     def _div(self, a: int, b: int, dtype: str) -> int:
-        if self._is(b, 1):
+        if self.is_constant(b, 1):
             return a
         return self._node("div", (a, b), dtype)
 

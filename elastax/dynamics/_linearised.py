@@ -1,12 +1,12 @@
 r"""Accelerations of joints and structure, and their tangents.
 
-The tangent of a solution of $M\,a = f - h$ needs no tangent of the mass matrix: with the
-inverse dynamics $r(x, a) = M a + h$ it is $M\,\delta a = \delta f - \delta r$. By the
-state r is differentiated in closed form, with half the operations of its differentiated
-recursion and nearly all of them common to all tangents: what is behind a joint turns as
-a whole, as if what is in front moved the other way. With screws $S_k$, twists $V_k$,
-accelerations $A_k$ (gravity included) and the wrench $F_k$ on all bodies behind a joint,
-in the base frame,
+The tangent of a solution of $M\,a = f - h$ needs no tangent of the mass matrix: with
+the inverse dynamics $r(x, a) = M a + h$ it is $M\,\delta a = \delta f - \delta r$. By
+the state r is differentiated in closed form, with fewer operations than the recursion's
+derivative has, most of them common to all tangents: what is behind a joint turns as a
+whole, as if what is in front moved the other way. With screws $S_k$, twists $V_k$ and
+accelerations $A_k$ (gravity included) in the base frame, and the wrench $F_k$ on all
+bodies behind a joint,
 
 $u_k = V_k \times S_k$, $w_k = A_k \times S_k + V_k \times u_k$,
 $U_j = \sum_{k \le j} (u_k\,\delta s_k + S_k\,\delta\dot s_k)$,
@@ -14,7 +14,8 @@ $W_j = \sum_{k \le j} (w_k\,\delta s_k + 2 u_k\,\delta\dot s_k)$,
 $\delta\tau_j = S_j^T (\sum_{b \ge j} (I_b W_b + B_b U_b) +
 \sum_{k \ge j} S_k \times^* F_k\,\delta s_k)$,
 
-where $B = V \times^* I - I\,V\times + (\cdot) \times^* I V$ of a body. By the parameters of
+where $B = V \times^* I - I\,V\times + (\cdot) \times^* I V$ of a body. The derivation
+is ours; peers differentiate the recursion in link frames instead. By the parameters of
 the robot autodiff differentiates r.
 """
 
@@ -64,8 +65,8 @@ def _force_cross(a, f):
 def _gyroscopic(terms: BodyTerms):
     r"""Momentum p and matrix N of $B u = 2\,(u_\omega \times p,\; N u_\omega)$.
 
-    $N = (v^T h)\,1 - v h^T - \tilde\omega\,\Sigma$ with the first moment h and the second
-    moment $\Sigma$ about the base origin: what Jacobi's identity leaves of B.
+    $N = (v^T h)\,1 - v h^T - \tilde\omega\,\Sigma$ with the first moment h and the
+    second moment $\Sigma$ about the base origin: what Jacobi's identity leaves of B.
     """
     first, inertia = about_origin(terms)
     v, w = terms.twist[:, :3], terms.twist[:, 3:]

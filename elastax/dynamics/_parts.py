@@ -194,7 +194,7 @@ def assemble(
                 index, direction = hinge_axes[part.of]
                 kind, role = JointKind.REVOLUTE, SlopeRole(index, len(slopes))
                 slopes.append(part.factor)
-        joints.append((place, np.asarray(direction, float)))
+        joints.append((place, (np.asarray(direction, float), True)))
         kinds.append(kind)
         roles.append(role)
         place = SAME

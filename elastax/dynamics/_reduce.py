@@ -1,8 +1,10 @@
 """Chains in which some joints are locked at zero."""
 
 import jax.numpy as jnp
+import numpy as np
 
-from ..kinematics import SAME, Placement, SerialChain, placements, structured
+from .._checks import is_concrete
+from ..kinematics import SAME, SerialChain, placement, placements, structured
 
 
 def locked_chain(chain: SerialChain, keep: tuple[int, ...]):
@@ -21,7 +23,10 @@ def locked_chain(chain: SerialChain, keep: tuple[int, ...]):
     dtype = chain.base.dtype
     carriers, poses, joints = [], [], []
     # of the current frame in the frame behind the last kept joint
-    place = Placement(chain.base[:3, :3], chain.base[:3, 3])
+    base, tool = (
+        np.asarray(x) if is_concrete(x) else x for x in (chain.base, chain.tool)
+    )
+    place = placement(base)
     carrier = -1
     for k, (before, axis, after) in enumerate(placements(chain.joints)):
         place = place.then(before)
@@ -34,8 +39,9 @@ def locked_chain(chain: SerialChain, keep: tuple[int, ...]):
         place = place.then(after)
     new = SerialChain(
         structured(joints),
-        jnp.eye(4, dtype=dtype),
-        place.matrix(dtype) @ chain.tool,
+        np.eye(4, dtype=dtype),
+        place.matrix(dtype) @ tool,
         tuple(chain.kinds[k] for k in keep),
     )
-    return new, (tuple(carriers), jnp.stack(poses))
+    stack = np.stack if is_concrete(*poses) else jnp.stack
+    return new, (tuple(carriers), stack(poses))

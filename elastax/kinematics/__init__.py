@@ -61,6 +61,7 @@ from ._structured import (
     JointStructure as JointStructure,
     Placement as Placement,
     StructuredJoints as StructuredJoints,
+    placement as placement,
     placements as placements,
     structured as structured,
 )

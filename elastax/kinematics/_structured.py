@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._checks import check_fields
+from .._checks import check_fields, is_concrete
 from .._custom_types import as_real
 from ._joints import AbstractJoints, JointFrames
 
@@ -72,7 +72,7 @@ class StructuredJoints(AbstractJoints):
         return {n: [k for k, yes in enumerate(w) if yes] for n, w in which.items()}
 
     def frames(self) -> JointFrames:
-        places, n = self._places(), self.number()
+        places, n, dtype = self._places(), self.number(), self.position.dtype
         before, axis = np.tile(np.eye(4), (n, 1, 1)), np.zeros((n, 3))
         for k, known in enumerate(self.structure):
             if known.rotation is not None:
@@ -80,33 +80,38 @@ class StructuredJoints(AbstractJoints):
             if known.axis is not None:
                 axis[k] = known.axis
         after = np.tile(np.eye(4), (n, 1, 1))
-        before, axis, after = (
-            jnp.asarray(x, self.position.dtype) for x in (before, axis, after)
-        )
-        if places["rotation"]:
-            rows = np.array(places["rotation"])
-            before = before.at[rows, :3, :3].set(self.rotation)
-        if places["position"]:
-            rows = np.array(places["position"])
-            before = before.at[rows, :3, 3].set(self.position)
-        if places["axis"]:
-            axis = axis.at[np.array(places["axis"])].set(self.axis)
-        return JointFrames(before, axis, after)
+        before = _set(before, (places["rotation"], np.s_[:3], np.s_[:3]), self.rotation)
+        before = _set(before, (places["position"], np.s_[:3], 3), self.position)
+        axis = _set(axis, (places["axis"],), self.axis)
+        return JointFrames(*(jnp.asarray(x, dtype) for x in (before, axis, after)))
 
     def number(self) -> int:
         return len(self.structure)
 
 
+def _set(array: Any, index: tuple, values: Any) -> Any:
+    """`array` with values; NumPy as long as it can be, JAX takes 20 ms an operation."""
+    index = tuple(np.array(i, int) if isinstance(i, list) else i for i in index)
+    if not len(values):
+        return array
+    if not is_concrete(array, values):
+        return jnp.asarray(array, values.dtype).at[index].set(values)
+    array[index] = np.asarray(values)
+    return array
+
+
 class Placement(NamedTuple):
-    """Frame in another one, structure as far as it is known.
+    """Frame in another one.
 
     Attributes:
-        rotation: NumPy array if it is made of right angles, else of JAX, (3, 3).
+        rotation: shape (3, 3), of NumPy if it is structure or its numbers are known.
         position: [m], shape (3,), or `None` for the same origin.
+        is_structure: whether the rotation is made of right angles for good.
     """
 
     rotation: Any
     position: Any
+    is_structure: bool = True
 
     def then(self, other: "Placement") -> "Placement":
         """Placement of a frame that has the placement `other` in this frame."""
@@ -114,14 +119,15 @@ class Placement(NamedTuple):
         if other.position is not None:
             moved = self.rotation @ other.position
             position = moved if position is None else position + moved
-        return Placement(self.rotation @ other.rotation, position)
+        both = self.is_structure and other.is_structure
+        return Placement(self.rotation @ other.rotation, position, both)
 
-    def matrix(self, dtype) -> Float[Array, "4 4"]:
+    def matrix(self, dtype) -> Float[Array, "4 4"] | Float[np.ndarray, "4 4"]:
         """Homogeneous matrix."""
-        pose = jnp.eye(4, dtype=dtype).at[:3, :3].set(jnp.asarray(self.rotation, dtype))
+        pose = _set(np.eye(4, dtype=dtype), np.s_[:3, :3], self.rotation)
         if self.position is None:
             return pose
-        return pose.at[:3, 3].set(self.position)
+        return _set(pose, np.s_[:3, 3], self.position)
 
 
 SAME = Placement(np.eye(3), None)
@@ -130,46 +136,52 @@ SAME = Placement(np.eye(3), None)
 def placements(joints: AbstractJoints) -> list[tuple[Placement, Any, Placement]]:
     """Placement in front of every joint's motion, its axis, and placement behind it."""
     frames = joints.frames()
+    arrays = (frames.before, frames.axis, frames.after)
+    before, axis, after = (np.asarray(x) if is_concrete(x) else x for x in arrays)
     if not isinstance(joints, StructuredJoints):
         return [
-            (_placement(before), axis, _placement(after))
-            for before, axis, after in zip(frames.before, frames.axis, frames.after)
+            (placement(b), (a, False), placement(c))
+            for b, a, c in zip(before, axis, after)
         ]
     found, dtype = [], joints.position.dtype
     for k, known in enumerate(joints.structure):
-        rotation, position = _placement(frames.before[k])
+        place = placement(before[k])
         if known.rotation is not None:
-            rotation = np.array(known.rotation, dtype)
-        axis = frames.axis[k] if known.axis is None else np.array(known.axis, dtype)
-        place = Placement(rotation, position if known.displaced else None)
-        found.append((place, axis, SAME))
+            place = Placement(np.array(known.rotation, dtype), place.position)
+        if not known.displaced:
+            place = place._replace(position=None)
+        direction = axis[k] if known.axis is None else np.array(known.axis, dtype)
+        found.append((place, (direction, known.axis is not None), SAME))
     return found
 
 
-def _placement(pose: Float[Array, "4 4"]) -> Placement:
-    return Placement(pose[:3, :3], pose[:3, 3])
+def placement(pose: Float[Array, "4 4"] | Float[np.ndarray, "4 4"]) -> Placement:
+    """A pose as a placement of which nothing is structure."""
+    return Placement(pose[:3, :3], pose[:3, 3], False)
 
 
-def structured(pairs: Sequence[tuple[Placement, Any]]) -> StructuredJoints:
-    """Joints from placements in front of their motions, and axes.
+def structured(joints: Sequence[tuple[Placement, tuple[Any, bool]]]):
+    """Joints from placements in front of their motions and from axes.
 
-    What is a NumPy array of right angles becomes structure, everything else a
-    parameter.
+    Args:
+        joints: placement, and axis with whether it is structure where it can be.
+            Structure are right angles and axes along those of the frame; what is none
+            becomes a parameter.
     """
     rotations, positions, axes, structure = [], [], [], []
-    for placement, axis in pairs:
+    for place, (axis, is_structure) in joints:
         known = JointStructure(
-            _right_angles(placement.rotation),
-            _along_an_axis(axis),
-            placement.position is not None,
+            _rows(_whole(place.rotation)) if place.is_structure else None,
+            _row(_whole(axis)) if is_structure else None,
+            place.position is not None,
         )
         structure.append(known)
         if known.rotation is None:
-            rotations.append(placement.rotation)
+            rotations.append(place.rotation)
         if known.axis is None:
             axes.append(axis)
         if known.displaced:
-            positions.append(placement.position)
+            positions.append(place.position)
     return StructuredJoints(
         _stack(rotations, (3, 3)),
         _stack(positions, (3,)),
@@ -186,19 +198,15 @@ def _stack(rows: list, shape: tuple[int, ...]):
     return jnp.stack([jnp.asarray(row) for row in rows])
 
 
-def _whole(array: Any) -> np.ndarray | None:
-    """A NumPy array of whole numbers but for rounding."""
-    if not isinstance(array, np.ndarray):
-        return None
+def _whole(array: np.ndarray) -> np.ndarray | None:
+    """Whole numbers that the array holds, but for rounding."""
     nearest = np.rint(array)
     return nearest.astype(int) if np.all(np.abs(array - nearest) < _TURNED) else None
 
 
-def _right_angles(rotation: Any) -> RightAngles | None:
-    whole = _whole(rotation)
-    return None if whole is None else tuple(tuple(row) for row in whole.tolist())
-
-
-def _along_an_axis(axis: Any) -> tuple[int, ...] | None:
-    whole = _whole(axis)
+def _row(whole: np.ndarray | None) -> tuple[int, ...] | None:
     return None if whole is None else tuple(whole.tolist())
+
+
+def _rows(whole: np.ndarray | None) -> RightAngles | None:
+    return None if whole is None else tuple(tuple(row) for row in whole.tolist())

@@ -55,6 +55,23 @@ def test_axes_and_nesting(definition):
     assert_same(evaluate(kernel(definition)), evaluate(definition))
 
 
+def test_results_that_nobody_reads_are_not_computed():
+    """The kernel of one result reads and computes what that one needs, in a batch."""
+    two = kernel(lambda a, b: (jnp.sin(a), jnp.exp(b)))
+    first = jax.jit(lambda a, b: jax.vmap(two, (0, None))(a, b)[0])
+    text = first.lower(M, Y).as_text()
+    assert "mhlo.fusion" in text and "stablehlo.exponential" not in text
+    assert_same(first(M, Y), jnp.sin(M))
+    # derivatives of one result: the tangent of the other goes as well
+    slope = jax.jit(jax.jacfwd(lambda a, b: two(a, b)[1], (0, 1)))
+    assert "stablehlo.sine" not in slope.lower(X, Y).as_text()
+    by_first, by_second = slope(X, Y)
+    assert_same(by_first, jnp.zeros((3, 3)))
+    assert_same(by_second, jnp.diag(jnp.exp(Y)))
+    both_read = jax.jit(lambda a, b: two(a, b))
+    assert "stablehlo.exponential" in both_read.lower(X, Y).as_text()
+
+
 @both
 def test_derivatives(definition):
     def evaluate(f):

@@ -4,10 +4,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from elastax._taylor import from_derivatives
 from elastax.kinematics import (
     forward_kinematics,
     jacobian,
     jacobian_derivatives,
+    tool_levers,
     tool_motion,
 )
 
@@ -34,6 +36,21 @@ def test_geometric_is_autodiff(chain):
     turning = jnp.stack([spin[2, 1], spin[0, 2], spin[1, 0]])
     expected = jnp.concatenate([rates[:3, 3], turning])
     assert_close(jacobian(chain, q), expected, rtol=1e-12, atol=1e-13)
+
+
+@each_chain
+def test_levers_are_columns_of_the_jacobian(chain):
+    """Without link frames, of coordinates and of their series."""
+    motion, joints = coordinates(chain, (4,)), (3, 0)
+    position, columns = jax.jit(lambda q: tool_levers(chain, q, joints))(motion[0])
+    assert_close(position, forward_kinematics(chain, motion[0])[:3, 3], rtol=1e-13)
+    expected = jacobian(chain, motion[0])[:3, np.array(joints)]
+    assert_close(columns, expected, rtol=1e-12, atol=1e-13)
+    series = jax.jit(lambda m: tool_levers(chain, from_derivatives(m), joints))(motion)
+    columns = series[1].derivatives()
+    expected = jacobian_derivatives(chain, motion)[:, :3, np.array(joints)]
+    scale = float(jnp.max(jnp.abs(expected)))
+    assert_close(columns, expected, rtol=1e-12, atol=1e-13 * scale)
 
 
 @each_chain
