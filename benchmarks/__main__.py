@@ -127,6 +127,7 @@ def environment(case: Case) -> dict[str, str]:
         "JAX_ENABLE_X64": "1",
         "JAX_ENABLE_COMPILATION_CACHE": "false",
         "JAX_PLATFORMS": "cpu",
+        "JAX_CPU_ENABLE_ASYNC_DISPATCH": "false" if case.inline else "true",
         "OMP_NUM_THREADS": str(case.threads),
         "XLA_FLAGS": flags.strip(),
     }

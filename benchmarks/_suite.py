@@ -17,17 +17,24 @@ class Case:
         threads: processors that the process may use.
         devices: host devices that JAX shows.
         limit: time after which the process is ended [s].
+        inline: whether programs run in the thread that calls them.
     """
 
     name: str
     threads: int = 2
     devices: int = 1
     limit: float = 240.0
+    inline: bool = False
 
 
 def _one(*names: str) -> tuple[Case, ...]:
     """Cases on one thread."""
     return tuple(Case(name, threads=1) for name in names)
+
+
+def _streamed(name: str) -> Case:
+    """A case as a controller would run it: a core of its own, no hand-over."""
+    return Case(name, threads=1, inline=True)
 
 
 _BATCHED = Case("batched_2", devices=2)
@@ -54,11 +61,11 @@ SUITE: dict[str, tuple[Case, ...]] = {
     ),
     "asim": (
         Case("asim_offline"),
-        Case("asim_step"),
+        _streamed("asim_step"),
         Case("asim_jvp"),
         Case("asim_vjp"),
-        Case("rigid_step"),
-        Case("flexible_joint_step"),
+        _streamed("rigid_step"),
+        _streamed("flexible_joint_step"),
     ),
     "simulation": (Case("one"), Case("vmap"), Case("devices", devices=2)),
     "gradients": (Case("reverse"), Case("forward"), Case("forward_18", limit=480.0)),

@@ -1,9 +1,12 @@
 """What does the structurally elastic feed-forward cost, offline and sample by sample?
 
 ASIM on the KR210, 1 s at 1 kHz. The reference route is the other one: the streamed
-steps for the offline computation, and the offline computation for the steps.
+steps for the offline computation, and the offline computation for the steps. Steps run
+as `docs/speed.md` says a controller runs them: in the calling thread, on a core of
+their own, without garbage collection.
 """
 
+import gc
 import time
 from collections.abc import Iterator
 
@@ -97,7 +100,10 @@ def streamed(name: str, effort: Effort) -> Iterator[dict]:
     samples = np.asarray(reference.derivatives)[: inverse.order() + 1].swapaxes(0, 1)
     both = lambda: compile_step(inverse, robot, DT)
     stream, seconds = _timed(both)
+    gc.freeze()
+    gc.disable()
     times = latency(stream, samples, 500 * effort.repeats)
+    gc.enable()
     stream.init(samples[0])
     outputs = [jax.tree.map(np.array, stream(sample)) for sample in samples]
     outputs = jax.tree.map(lambda *x: np.stack(x), *outputs)
@@ -108,7 +114,7 @@ def streamed(name: str, effort: Effort) -> Iterator[dict]:
         f"{name}_step",
         1e6 * times.p99,
         "us",
-        threads=2,
+        threads=1,
         max_difference=difference(command, offline),
         compile_s=seconds,
         checks=(
@@ -129,7 +135,7 @@ def streamed(name: str, effort: Effort) -> Iterator[dict]:
             "compile_asim_step",
             seconds,
             "s",
-            threads=2,
+            threads=1,
             compile_s=seconds,
             checks=(Check("value", 10.0, 5),),
             note="first sample and step together",

@@ -17,7 +17,7 @@ def main(argv: list[str] | None = None) -> int:
     progress.say(f"elastax {command}: loading JAX ...")
     from ._runtime import configure
 
-    configure()
+    configure(inline=isinstance(config, FeedforwardConfig) and config.stream)
     try:
         if isinstance(config, FeedforwardConfig):
             from ._feedforward import feedforward

@@ -172,7 +172,7 @@ def compile_programs(
     # a failed simulation shows in its figures; an error raised from inside the program
     # would keep it out of the persistent cache
     plant = lambda p, c, r: run_command(p, c, r, controller, throw=False)
-    jobs = {"elastic plant": (plant, robot, command, reference)}
+    jobs: dict[str, tuple] = {"elastic plant": (plant, robot, command, reference)}
     for name in names:
         inverse = INVERSES[name].feedforward
         jobs[f"{name} feed-forward"] = (inverse, robot, reference)

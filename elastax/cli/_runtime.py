@@ -6,14 +6,19 @@ import pathlib
 import jax
 
 
-def configure() -> None:
+def configure(*, inline: bool = False) -> None:
     """Switch on double precision, a device per core and the compilation cache.
 
     The cache lies in `ELASTAX_CACHE`, else in `~/.cache/elastax`;
     `JAX_COMPILATION_CACHE_DIR` goes before both. A number of devices that the user
     set, by `JAX_NUM_CPU_DEVICES` or in `XLA_FLAGS`, stays.
+
+    Args:
+        inline: run programs in the thread that calls them, for short latencies.
     """
     jax.config.update("jax_enable_x64", True)
+    if inline:
+        jax.config.update("jax_cpu_enable_async_dispatch", False)
     _use_all_cores()
     # checks inside programs give NaN, which the job reports: a program that can call
     # back into Python would not be kept in the cache

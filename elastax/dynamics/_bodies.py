@@ -56,9 +56,9 @@ class RigidBodies(eqx.Module):
 
     def moved(self, pose: Transform) -> "RigidBodies":
         """Bodies given in a frame that has `pose` in the frame of their link."""
-        pose, com, inertia = _at_hand(pose, self.com, self.inertia)
-        rotation, position = pose[:3, :3], pose[:3, 3]
-        einsum = np.einsum if is_concrete(pose, com, inertia) else jnp.einsum
+        frame, com, inertia = _at_hand(pose, self.com, self.inertia)
+        rotation, position = frame[:3, :3], frame[:3, 3]
+        einsum = np.einsum if is_concrete(frame, com, inertia) else jnp.einsum
         return RigidBodies(
             self.mass,
             einsum("ab,kb->ka", rotation, com) + position[None],

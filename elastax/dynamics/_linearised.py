@@ -152,7 +152,8 @@ def _differentiable(robot, q, eta, qd, etad, force, rotors):
 @_differentiable.def_jvp
 def _tangent(primals, tangents):
     """Tangents are `None` where nothing moves."""
-    robot, *state, force, rotors = primals
+    robot, q, eta, qd, etad, force, rotors = primals
+    state = q, eta, qd, etad
     robot_rate, *rates, force_rate, rotor_rate = tangents
     n = robot.axes
     factor, rest = _balance(robot, *state, force, rotors)

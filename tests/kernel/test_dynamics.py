@@ -41,7 +41,8 @@ STATE = {
 
 def scaled(tree):
     """Leaves over their magnitude: a tolerance relative to the whole."""
-    return jax.tree.map(lambda leaf: leaf / (1e-300 + jnp.max(jnp.abs(leaf))), tree)
+    largest = lambda leaf: jnp.max(jnp.abs(leaf), initial=1e-300)
+    return jax.tree.map(lambda leaf: leaf / largest(leaf), tree)
 
 
 def assert_equal_to_written(function, *args):
