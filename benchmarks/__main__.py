@@ -58,7 +58,8 @@ def main(argv: list[str] | None = None) -> int:
                 if problem is not None:
                     problems.append(f"{name}, {case.name}: {problem}")
                     say(start, f"    FAILED: {problem}")
-    header["minutes"] = (time.perf_counter() - start) / 60
+    if not options.keep:  # else the rows come from several runs
+        header["minutes"] = (time.perf_counter() - start) / 60
     rows, problems = merged(rows, problems, chosen, options.out, options.keep)
     write(options.out, header, rows, problems)
     say(start, f"results in {options.out / 'RESULTS.md'}")
