@@ -16,6 +16,10 @@ from ._damping import (
     attenuate as attenuate,
     limit as limit,
 )
+from ._exponential import (
+    rotation_from_vector as rotation_from_vector,
+    transform_from_twist as transform_from_twist,
+)
 from ._ik_analytic import (
     SphericalWrist as SphericalWrist,
     inverse_kinematics as inverse_kinematics,
@@ -45,6 +49,17 @@ from ._joints import (
     JointFrames as JointFrames,
     JointKind as JointKind,
     RPYJoints as RPYJoints,
+)
+from ._link_conventions import (
+    HayatiJoints as HayatiJoints,
+    MixedJoints as MixedJoints,
+    ModifiedDHJoints as ModifiedDHJoints,
+    VeitscheggerWuJoints as VeitscheggerWuJoints,
+)
+from ._parameters import (
+    ChainParameters as ChainParameters,
+    Parameter as Parameter,
+    parameter_jacobian as parameter_jacobian,
 )
 from ._se3 import (
     inverse_transform as inverse_transform,

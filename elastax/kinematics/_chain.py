@@ -17,6 +17,7 @@ from .._taylor import (
     skew,
 )
 from ._joints import AbstractJoints, DHJoints, FrameJoints, JointKind, RPYJoints
+from ._link_conventions import HayatiJoints, ModifiedDHJoints, VeitscheggerWuJoints
 from ._se3 import transform
 
 
@@ -65,6 +66,63 @@ class SerialChain(eqx.Module):
             [KinModell] table 3-2.
         """
         return _chain(DHJoints(theta, d, a, alpha), kinds, base, tool)
+
+    @staticmethod
+    def from_modified_dh(alpha, a, theta, d, *, kinds=None, base=None, tool=None):
+        """Chain from a modified Denavit-Hartenberg table, in Craig's order.
+
+        Args:
+            alpha: twists about x in front of each axis [rad], shape (joints,).
+            a: lengths along x in front of each axis [m].
+            theta: joint offsets [rad].
+            d: offsets along z [m].
+            kinds, base, tool: as for `from_dh`.
+        """
+        return _chain(ModifiedDHJoints(alpha, a, theta, d), kinds, base, tool)
+
+    @staticmethod
+    def from_hayati(theta, a, alpha, beta, *, kinds=None, base=None, tool=None):
+        """Chain of Hayati-Mirmirani joints, for parallel axes.
+
+        Args:
+            theta: joint offsets [rad], shape (joints,).
+            a: lengths along x [m].
+            alpha, beta: tilts about x and y of the next axis [rad].
+            kinds, base, tool: as for `from_dh`.
+
+        References:
+            [KinModell] table 3-3.
+        """
+        return _chain(HayatiJoints(theta, a, alpha, beta), kinds, base, tool)
+
+    @staticmethod
+    def from_veitschegger_wu(
+        theta, d, a, alpha, beta, *, kinds=None, base=None, tool=None
+    ):
+        """Chain of Veitschegger-Wu joints.
+
+        Args:
+            theta: joint offsets [rad], shape (joints,).
+            d: offsets along z [m].
+            a: lengths along x [m].
+            alpha, beta: tilts about x and y of the next axis [rad].
+            kinds, base, tool: as for `from_dh`.
+
+        References:
+            [KinModell] table 3-4.
+        """
+        joints = VeitscheggerWuJoints(theta, d, a, alpha, beta)
+        return _chain(joints, kinds, base, tool)
+
+    @staticmethod
+    def from_joints(joints, *, kinds=None, base=None, tool=None):
+        """Chain of joints in any convention, mixed ones included.
+
+        Args:
+            joints: `AbstractJoints`, such as `MixedJoints`.
+            kinds, base, tool: as for `from_dh`.
+        """
+        return _chain(joints, kinds, base, tool)
 
     @staticmethod
     def from_frames(rotation, position, axis, *, kinds=None, base=None, tool=None):
