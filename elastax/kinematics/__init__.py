@@ -1,5 +1,6 @@
 """Homogeneous transforms, serial chains, Jacobians and inverse kinematics."""
 
+from ._arm import Arm as Arm
 from ._chain import (
     MovingFrames as MovingFrames,
     SerialChain as SerialChain,
@@ -15,6 +16,10 @@ from ._damping import (
     SigmoidDamping as SigmoidDamping,
     attenuate as attenuate,
     limit as limit,
+)
+from ._dependence import (
+    Dependence as Dependence,
+    dependent_columns as dependent_columns,
 )
 from ._exponential import (
     rotation_from_vector as rotation_from_vector,
