@@ -18,10 +18,21 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from elastax.analysis import locked_frequencies
+from elastax.dynamics import forward_dynamics, inverse_dynamics, simulate
+from elastax.inverse import ASIM
+from elastax.kinematics import (
+    SphericalWrist,
+    forward_kinematics,
+    inverse_kinematics,
+    jacobian,
+)
+from elastax.robots import kr210
+from elastax.signals import Reference
 
 from ._machine import machine, versions
 from ._rows import relative_difference
-from ._systems import controller, move_commands, random_states, tree_robot
+from ._systems import controller, move_commands, random_states, swing, tree_robot
 from ._timing import Effort, compile_timed, measure
 
 
@@ -54,9 +65,9 @@ def cases() -> Iterator[tuple[str, Callable[[], GPUCase]]]:
     yield "inverse_kinematics", lambda: _branches(1 << 16)
     yield "rigid_inverse_dynamics", lambda: _rigid(1 << 18)
     yield "elastic_forward_dynamics", lambda: _elastic(1 << 16)
+    yield "asim_offline", lambda: _asim(1024)
+    yield "closed_loop_simulation", lambda: _simulation(128)
     yield "locked_frequencies", lambda: _frequencies(1 << 14)
-    yield "asim_offline", lambda: _asim(128)
-    yield "closed_loop_simulation", lambda: _simulation(32)
 
 
 def _states(robot, count: int, names: str) -> tuple:
@@ -65,8 +76,6 @@ def _states(robot, count: int, names: str) -> tuple:
 
 
 def _kinematics(name: str, count: int) -> GPUCase:
-    from elastax.kinematics import forward_kinematics, jacobian
-    from elastax.robots import kr210
 
     robot = kr210()
     function = {"pose": forward_kinematics, "jacobian": jacobian}[name]
@@ -75,13 +84,11 @@ def _kinematics(name: str, count: int) -> GPUCase:
         robot,
         _states(robot, count, "q eta"),
         1e-12,
-        "pose of an elastic KR210, 17 joints",
+        f"{name} of an elastic KR210, 17 joints",
     )
 
 
 def _branches(count: int) -> GPUCase:
-    from elastax.kinematics import SphericalWrist, forward_kinematics, inverse_kinematics
-    from elastax.robots import kr210
 
     chain = kr210().rigid().chain
     q = jnp.asarray(random_states(kr210(), count)["q"])
@@ -103,8 +110,6 @@ def _branches(count: int) -> GPUCase:
 
 
 def _rigid(count: int) -> GPUCase:
-    from elastax.dynamics import inverse_dynamics
-    from elastax.robots import kr210
 
     robot = kr210().rigid()
     return GPUCase(
@@ -117,7 +122,6 @@ def _rigid(count: int) -> GPUCase:
 
 
 def _elastic(count: int) -> GPUCase:
-    from elastax.dynamics import forward_dynamics
 
     robot = tree_robot()
     names = "q eta theta qd etad thetad tau_m"
@@ -131,8 +135,6 @@ def _elastic(count: int) -> GPUCase:
 
 
 def _frequencies(count: int) -> GPUCase:
-    from elastax.analysis import locked_frequencies
-    from elastax.robots import kr210
 
     robot = kr210()
     return GPUCase(
@@ -145,11 +147,6 @@ def _frequencies(count: int) -> GPUCase:
 
 
 def _asim(count: int) -> GPUCase:
-    from elastax.inverse import ASIM
-    from elastax.robots import kr210
-    from elastax.signals import Reference
-
-    from ._systems import swing
 
     robot, one = kr210(), swing(1000, kr210().axes)
     motion = np.asarray(one.derivatives)
@@ -167,8 +164,6 @@ def _asim(count: int) -> GPUCase:
 
 
 def _simulation(repeat: int) -> GPUCase:
-    from elastax.dynamics import simulate
-    from elastax.robots import kr210
 
     robot = kr210()
     commands = move_commands(robot)
@@ -212,7 +207,7 @@ def measured(name: str, case: GPUCase) -> dict:
 
 def main(argv: list[str] | None = None) -> int:
     """Measure, write, and return 1 if a result differs from the CPU's."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.gpu", description=__doc__)
+    parser = argparse.ArgumentParser("python -m benchmarks.gpu", description=__doc__)
     parser.add_argument("names", nargs="*", help="cases; all if none")
     parser.add_argument(
         "--out", type=pathlib.Path, default=pathlib.Path(__file__).parent
@@ -255,11 +250,11 @@ def write(folder: pathlib.Path, header: dict, rows: list[dict]) -> None:
         "",
         f"{header['device']}; {header['machine']['cpu']}, "
         f"{header['machine']['cores']} cores; jax {header['versions']['jax']}, jaxlib "
-        f"{header['versions']['jaxlib']}; float64; {header['date']}. Made by `python -m "
-        "benchmarks.gpu`.",
+        f"{header['versions']['jaxlib']}; float64; {header['date']}. Made by "
+        "`python -m benchmarks.gpu`.",
         "",
-        "| function | batch | per sample | whole call | difference to the CPU | compile "
-        "| a sample is |",
+        "| function | batch | per sample | whole call | difference to the CPU "
+        "| compile | a sample is |",
         "|---|---|---|---|---|---|---|",
     ]
     for entry in rows:
