@@ -1,10 +1,10 @@
 """How many poses does the numeric inverse reach, and how fast, restarts included?
 
-Targets are poses of joint vectors uniform within the limits. A target counts as reached
-when the tool is within 1e-6 m and 1e-6 rad of it and all joints are within their limits,
+Targets are poses of joint vectors uniform within the limits. A target is solved when
+the tool is within 1e-6 m and 1e-6 rad of it and all joints are within their limits,
 with up to 32 starts. The Robotics Toolbox searches the same targets with as many starts
-of its own choice and the same tolerance, in C++, called once per target from Python; it
-installs beside the other peers, and rows without it are its absence.
+of its own choice and the same tolerance, in C++, called once per target from Python.
+Both sides are judged by the toolbox's forward kinematics.
 """
 
 import importlib.util

@@ -1,4 +1,4 @@
-"""Chains of elastax as transform sequences of the Robotics Toolbox, and its searches."""
+"""Chains of elastax as transforms of the Robotics Toolbox, and its searches."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -75,9 +75,11 @@ def searches(
 
     def run():
         found = [ets.ik_LM(target, joint_limits=True, **options) for target in targets]
-        q, reached, iterations, tried, _ = zip(*found)
         return Searched(
-            np.array(q), np.array(reached, bool), np.array(iterations), np.array(tried)
+            np.array([s.q for s in found]),
+            np.array([s.success for s in found], bool),
+            np.array([s.iterations for s in found]),
+            np.array([s.searches for s in found]),
         )
 
     return run

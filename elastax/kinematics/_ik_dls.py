@@ -285,7 +285,7 @@ def _resting(q: PerJoint, moving: np.ndarray) -> PerJoint:
 
 
 def check_indices(name: str, indices: tuple[int, ...], number: int) -> None:
-    """Raise `ValueError` unless `indices` are distinct, not none, and below `number`."""
+    """Raise `ValueError` unless the indices are distinct and below `number`."""
     distinct = len(set(indices)) == len(indices) > 0
     if not (distinct and all(0 <= index < number for index in indices)):
         raise ValueError(

@@ -53,9 +53,7 @@ def turn_between(target: Matrix3, actual: Matrix3) -> Vector3:
     length = jnp.sqrt(jnp.where(tiny, 1.0, square))
     sign = jnp.where(scalar < 0, -1.0, 1.0)
     angle = 2 * jnp.arctan2(length, jnp.abs(scalar))
-    factor = jnp.where(
-        tiny, 2 / jnp.where(tiny, scalar, 1.0), sign * angle / length
-    )
+    factor = jnp.where(tiny, 2 / jnp.where(tiny, scalar, 1.0), sign * angle / length)
     return factor * vector
 
 
@@ -97,9 +95,7 @@ def without_base(
     frames = chain.joints.frames()
     first = jnp.asarray(identity, frames.before.dtype)[None]
     fixed = jnp.concatenate([first, frames.after[:-1]]) @ frames.before
-    turned = transform(
-        jax.vmap(_basis)(frames.axis), jnp.zeros_like(frames.axis)
-    )
+    turned = transform(jax.vmap(_basis)(frames.axis), jnp.zeros_like(frames.axis))
     back = jax.vmap(inverse_transform)(turned)
     before = jnp.concatenate([first, back[:-1]]) @ fixed @ turned
     none = jnp.zeros((0, 3), before.dtype)
@@ -167,8 +163,8 @@ def _attached_jvp(rows, primals, tangents):
     found = attached(rows, chain, target, found, weights)
     counted = np.array(rows)
     matrix, _ = evaluate(chain, target, found)
-    still = lambda chain, target: evaluate(chain, target, jax.lax.stop_gradient(found))
-    (_, moved) = jax.jvp(still, (chain, target), tuple(tangents[:2]))[1]
+    lacking = lambda chain, target: evaluate(chain, target, found)[1]
+    moved = jax.jvp(lacking, (chain, target), tuple(tangents[:2]))[1]
     scaled = weights[:, None] * matrix[counted]
     return found, least_norm(scaled, weights * moved[counted])
 

@@ -36,8 +36,8 @@ def minimise_pose(
 ) -> NumericSolution:
     r"""Joint coordinates of the smallest pose error, from `q` and from around it.
 
-    $\min_\theta |W\,\Delta x(\theta)|^2$, by Levenberg-Marquardt, needs no inverse of the
-    Jacobian: it does not fail where that is singular. Started at a posture near a
+    $\min_\theta |W\,\Delta x(\theta)|^2$, by Levenberg-Marquardt, needs no inverse of
+    the Jacobian: it does not fail where that is singular. Started at a posture near a
     singular pose and at neighbours of it, it enters the pose with the smallest change
     of the joints among the solutions found. Limits enter as a penalty, zero within
     them.

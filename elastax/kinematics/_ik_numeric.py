@@ -112,8 +112,8 @@ def solve_pose(
             one.
 
     References:
-        [Berns] "Optimierung: Algorithmus"; [KinModell] (3-43), (3-130), with the bracket
-        that the text lacks; [Reiner2010] (3.57), (3.58).
+        [Berns] "Optimierung: Algorithmus"; [KinModell] (3-43), (3-130), with the
+        bracket that the text lacks; [Reiner2010] (3.57), (3.58).
     """
     check_indices("rows", rows, 6)
     counted = np.array(rows)

@@ -80,10 +80,10 @@ class PoseSearch(eqx.Module):
         max_steps: of one start.
     """
 
-    gain: Scalar = eqx.field(converter=as_real, default=1e-3)
+    gain: Scalar = eqx.field(converter=as_real, default=1e-2)
     largest_step: Scalar = eqx.field(converter=as_real, default=1.0)
-    progress: Scalar = eqx.field(converter=as_real, default=0.7)
-    slack: Scalar = eqx.field(converter=as_real, default=10.0)
+    progress: Scalar = eqx.field(converter=as_real, default=0.6)
+    slack: Scalar = eqx.field(converter=as_real, default=30.0)
     max_steps: Scalar = eqx.field(converter=as_real, default=40.0)
 
     def __check_init__(self):

@@ -38,8 +38,8 @@ class PseudoInverseStep(AbstractStep):
     r"""Newton's method and Gauss-Newton: $\Delta\theta = J^+ \Delta x$.
 
     $J^+ = J^{-1}$ of a square matrix, $J^T (J J^T)^{-1}$ for a redundant arm,
-    $(J^T J)^{-1} J^T$ for an over-determined one; by singular values, so that directions
-    in which the arm cannot move are left out instead of dividing by zero.
+    $(J^T J)^{-1} J^T$ for an over-determined one; by singular values, so that
+    directions in which the arm cannot move are left out instead of dividing by zero.
 
     Attributes:
         cutoff: singular values below this part of the largest one count as zero.
@@ -134,10 +134,9 @@ class RestPostureStep(AbstractStep):
 def limit_step(correction: PerJoint, largest: Scalar | PerJoint) -> PerJoint:
     r"""Correction shortened until no joint moves more than it may, direction kept.
 
-    $\Delta\varphi / \max(1, \max_k |\Delta\varphi_k| / \Delta\varphi_{max,k})$. The text
-    limits each joint by a factor of its own, which turns the direction, and misses the
-    index of the full error vector; one common factor is what leads out of a singular
-    posture.
+    $\Delta\varphi / \max(1, \max_k |\Delta\varphi_k| / \Delta\varphi_{max,k})$. The
+    text divides one element of the error by a factor for each joint, where the whole
+    vector is meant, and which turns the direction of the correction.
 
     Args:
         correction: [rad] or [m], shape (joints,).

@@ -54,8 +54,8 @@ def hard_and_soft(
     $$\begin{pmatrix} 2A^TA & J^T \\ J & 0 \end{pmatrix}
     \begin{pmatrix} x \\ \lambda \end{pmatrix} =
     \begin{pmatrix} 2A^Tq \\ b \end{pmatrix}.$$
-    Unique if J has full row rank and $A^TA$ is positive definite on its kernel, of which
-    the text asks neither; otherwise the solution of smallest norm is returned.
+    Unique if J has full row rank and $A^TA$ is positive definite on its kernel, of
+    which the text asks neither; otherwise the solution of smallest norm is returned.
 
     Args:
         hard: J, shape (rows, joints), such as the Jacobian of the tool.

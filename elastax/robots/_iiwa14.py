@@ -7,7 +7,7 @@ from ..kinematics import Arm, SerialChain
 
 
 def iiwa14() -> Arm:
-    """KUKA LBR iiwa 14 R820, 0.82 m reach, seven axes with spherical shoulder and wrist.
+    """KUKA LBR iiwa 14 R820, 0.82 m reach, seven axes, spherical shoulder and wrist.
 
     Zero is the upright arm. The tool frame is the flange without media coupling: z
     points outwards. The angles are the maker's.

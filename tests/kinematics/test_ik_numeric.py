@@ -11,6 +11,7 @@ from elastax.kinematics import (
     PoseResults,
     PseudoInverseStep,
     RestPostureStep,
+    SerialChain,
     forward_kinematics,
     jacobian,
     pose_difference,
@@ -108,11 +109,13 @@ def test_rest_posture_of_a_redundant_arm():
     )
     # run on: the pose is reached long before the posture settles
     settle = jax.jit(
-        lambda q: q
-        + step(
-            jacobian(chain, q)[:2],
-            (target - forward_kinematics(chain, q))[:2, 3],
-            q,
+        lambda q: (
+            q
+            + step(
+                jacobian(chain, q)[:2],
+                (target - forward_kinematics(chain, q))[:2, 3],
+                q,
+            )
         )
     )
     settled = []
@@ -156,11 +159,17 @@ def test_over_determined_arm_finds_the_nearest_pose():
     chain = planar(1.0, 0.8)
     rows = (0, 1, 5)
     goal = forward_kinematics(chain, jnp.array([0.2, 1.2]))
-    target = transform(rotation_from_vector(jnp.array([0, 0, 0.3])) @ goal[:3, :3],
-                       goal[:3, 3])
+    target = transform(
+        rotation_from_vector(jnp.array([0, 0, 0.3])) @ goal[:3, :3], goal[:3, 3]
+    )
     for step in (PseudoInverseStep(), ErrorDampedStep()):
         found = solve_pose(
-            chain, target, jnp.array([0.4, 1.0]), step=step, rows=rows, throw=False,
+            chain,
+            target,
+            jnp.array([0.4, 1.0]),
+            step=step,
+            rows=rows,
+            throw=False,
             max_steps=300,
         )
         assert found.result == PoseResults.out_of_reach
@@ -222,6 +231,20 @@ def test_gradient(rows):
         return found if len(rows) == 6 else actual[:3, 3]
 
     assert_gradient(function, puma().joints, jnp.full(6, 0.05))
+
+
+def test_second_derivative():
+    """Elbow of a planar arm by its link lengths."""
+    start = jnp.array([0.2, 1.2])
+    target = forward_kinematics(planar(1.0, 0.8), start)
+
+    def function(lengths):
+        zero = jnp.zeros(2)
+        chain = SerialChain.from_dh(zero, zero, lengths, zero)
+        options = dict(position_tolerance=1e-13, rows=PLANE)
+        return solve_pose(chain, target, start, **options).value
+
+    assert_gradient(function, jnp.array([1.05, 0.82]), order=2)
 
 
 def test_refusals():
