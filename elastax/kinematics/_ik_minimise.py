@@ -90,15 +90,18 @@ def minimise_pose(
 
     def descend(start):
         found = optx.least_squares(
-            residual, solver, start, max_steps=max_steps, throw=False
+            residual,
+            solver,
+            jnp.clip(start, low, high),
+            max_steps=max_steps,
+            throw=False,
         )
         value = jnp.clip(found.value, low, high)
         _, difference = evaluate(fixed, wanted, value)
         return value, difference, found.stats["num_steps"]
 
-    values, differences, steps = jax.vmap(descend)(
-        jnp.clip(_around(near, spread, neighbours), low, high)
-    )
+    starts = _around(near, spread, neighbours)
+    values, differences, steps = jax.vmap(descend)(starts)
     distances, angles = jax.vmap(errors_of)(differences)
     reached = (distances <= position_tolerance) & (angles <= rotation_tolerance)
     changes = jnp.sum((values - near[None]) ** 2, axis=1)

@@ -86,7 +86,10 @@ def solve_pose(
 
     Joints at a limit rest as long as the error pushes them outwards, and no joint
     passes its limit. An arm with too few joints comes to rest at the pose of the
-    smallest error, with `PoseResults.out_of_reach`.
+    smallest error, with `PoseResults.out_of_reach`. A target farther away than the arm
+    reaches needs a `DampedStep` whose damping, squared, exceeds half the missing
+    distance times the length of the arm, or `minimise_pose`: else the arm swings about
+    the stretched posture until `max_steps`.
 
     The solution is differentiable with respect to `chain` and `target` by the implicit
     function theorem; for a redundant arm the derivative is the one of the smallest
