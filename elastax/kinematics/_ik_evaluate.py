@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from .._custom_types import Matrix3, PerJoint, Scalar, Transform, Vector3
 from .._kernel import kernel
+from .._taylor import leading
 from ._chain import SerialChain, moving_frames
 from ._ik_dls import damped_least_squares
 from ._jacobian import tool_jacobian
@@ -75,8 +76,8 @@ def evaluate(
 ) -> tuple[Geometric, Difference]:
     """Geometric Jacobian at a posture and what its pose lacks to the target."""
     frames = moving_frames(chain, q)
-    actual = transform(frames.tool_rotation, frames.tool_position)
-    return tool_jacobian(chain, frames), pose_difference(target, actual)
+    actual = transform(leading(frames.tool_rotation), leading(frames.tool_position))
+    return leading(tool_jacobian(chain, frames)), pose_difference(target, actual)
 
 
 def without_base(

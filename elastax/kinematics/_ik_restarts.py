@@ -19,13 +19,12 @@ from .._custom_types import PerJoint, Scalar, Transform, as_real, require_float6
 from .._kernel import kernel
 from ._arm import Arm
 from ._chain import SerialChain
-from ._ik_dls import damped_least_squares, row_weights
+from ._ik_dls import check_indices, damped_least_squares, row_weights
 from ._ik_evaluate import attached, errors_of, evaluate, without_base
 from ._joints import JointKind
 from ._starts import low_discrepancy
 
 
-_ROWS = (0, 1, 2, 3, 4, 5)
 _FLOOR = 1e-12  # of the squared damping over the square of the characteristic length
 
 
@@ -147,6 +146,7 @@ def find_pose(
     *,
     search: PoseSearch | None = None,
     starts: int = 32,
+    rows: tuple[int, ...] = (0, 1, 2, 3, 4, 5),
     characteristic_length: Scalar | float = 1.0,
     position_tolerance: Scalar | float = 1e-6,
     rotation_tolerance: Scalar | float = 1e-6,
@@ -170,13 +170,15 @@ def find_pose(
             equivalent turns that is nearest to it within the limits.
         search: how every start proceeds.
         starts: largest number of starts.
+        rows: rows of the pose that count; (0, 1, 2) leaves the orientation free.
         characteristic_length: length that turns 1 rad into a distance [m].
-        position_tolerance: largest distance from the target [m].
-        rotation_tolerance: largest angle [rad].
+        position_tolerance: largest distance in the rows that count [m].
+        rotation_tolerance: largest angle in the rows that count [rad].
         throw: raise an error if the pose is not reached; otherwise see `result`.
 
     Raises:
-        ValueError: `starts` is not positive, or JAX runs in single precision.
+        ValueError: `starts` is not positive, `rows` are not distinct indices, or JAX
+            runs in single precision.
 
     References:
         [Berns] for the iteration, [KinModell] (3-43), (3-44); [Reiner2010] (3.58),
@@ -185,20 +187,23 @@ def find_pose(
     require_float64("the search of a pose")
     if starts < 1:
         raise ValueError(f"`starts` must be 1 or more, but is {starts}")
+    check_indices("rows", rows, 6)
     search = PoseSearch() if search is None else search
     numbers = (characteristic_length, position_tolerance, rotation_tolerance)
     length, *tolerances = (as_real(x) for x in numbers)
     fixed, wanted, given = jax.lax.stop_gradient((arm, target, q))
     chain, wanted = without_base(fixed.chain, wanted)
     limits = jnp.stack([fixed.lower, fixed.upper])
-    settings = jax.lax.stop_gradient((search, length, *tolerances, as_real(starts)))
+    counted = as_real(np.isin(np.arange(6), rows))
+    settings = (search, length, *tolerances, counted, as_real(starts))
+    settings = jax.lax.stop_gradient(settings)
     first = _start(chain, limits, jnp.zeros(())) if given is None else given
     lane = _Lane.unpacked(_searched(chain, wanted, first, limits, settings))
 
     value = lane.best
     if given is not None:
         value = _nearest_turn(chain, limits, value, given)
-    value = attached(_ROWS, arm.chain, target, value, row_weights(length))
+    value = attached(rows, arm.chain, target, value, row_weights(length, rows))
     reached = lane.reached > 0
     result = SearchResults.where(
         reached, SearchResults.successful, SearchResults.not_found
@@ -268,11 +273,12 @@ def _searched_batch(size, is_batched, *args):
 @kernel
 def _advance(chain, target, limits, settings, state) -> Float[Array, " state"]:
     """Evaluate a posture: reached, corrected, or given up for the next start."""
-    search, length, position_tolerance, rotation_tolerance, _ = settings
-    lane, weights = _Lane.unpacked(state), row_weights(length)
+    search, length, position_tolerance, rotation_tolerance, counted, _ = settings
+    lane, weights = _Lane.unpacked(state), counted * row_weights(length)
     number = lambda condition: jnp.where(condition, 1.0, 0.0)
     still = SerialChain(chain.joints, np.eye(4), chain.tool, chain.kinds)
     matrix, difference = evaluate(still, target, lane.q)
+    difference = counted * difference
     distance, angle = errors_of(difference)
     reached = (distance <= position_tolerance) & (angle <= rotation_tolerance)
     matrix, error = weights[:, None] * matrix, weights * difference

@@ -124,7 +124,8 @@ def test_other_devices_search_side_by_side(searched):
 
     arm, targets, found = searched
     chain, limits = arm.chain, jnp.stack([arm.lower, arm.upper])
-    settings = (PoseSearch(), *(jnp.array(x) for x in (1.0, 1e-6, 1e-6, 32.0)))
+    settings = (PoseSearch(), *map(jnp.array, (1.0, 1e-6, 1e-6)))
+    settings = *settings, jnp.ones(6), jnp.array(32.0)
 
     def lanes(targets):
         def one(target):
@@ -172,6 +173,20 @@ def test_sliding_joints_with_tilted_axes():
     targets = random_targets(arm, 20)
     found = find_all(arm, targets)
     assert np.all(solved(arm, found.value, targets))
+
+
+def test_position_only():
+    """Seven joints, three rows: poses out of reach, but not their points."""
+    arm = iiwa14()
+    targets = random_targets(arm, 20)
+    turned = targets.at[:, :3, :3].set(jnp.eye(3))
+    find = jax.jit(lambda a, t: jax.vmap(lambda x: find_pose(a, x, rows=(0, 1, 2)))(t))
+    found = find(arm, turned)
+    actual = tool_poses(arm.chain, found.value)
+    distance = jnp.linalg.norm((actual - turned)[:, :3, 3], axis=1)
+    assert distance.max() <= TOLERANCE and np.all(found.reached)
+    inside = (found.value >= arm.lower[None]) & (found.value <= arm.upper[None])
+    assert np.all(inside)
 
 
 def test_gradient():
@@ -238,3 +253,5 @@ def test_search_refuses(options, what):
 def test_refusals():
     with pytest.raises(ValueError, match="starts"):
         find_pose(ur10e(), jnp.eye(4), starts=0)
+    with pytest.raises(ValueError, match="rows"):
+        find_pose(ur10e(), jnp.eye(4), rows=(1, 1))
