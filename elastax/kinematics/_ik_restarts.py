@@ -77,6 +77,10 @@ class PoseSearch(eqx.Module):
         progress: p in (0, 1].
         slack: s >= 1.
         max_steps: of one start.
+
+    References:
+        [Sugihara2011] for the damping, without its constant bias; [Reiner2010] (3.58),
+        with one factor for all joints.
     """
 
     gain: Scalar = eqx.field(converter=as_real, default=1e-2)
@@ -181,8 +185,8 @@ def find_pose(
             runs in single precision.
 
     References:
-        [Berns] for the iteration, [KinModell] (3-43), (3-44); [Reiner2010] (3.58),
-        (3.63b). The damping by the error is that of [Sugihara2011] without its bias.
+        [Berns] "Optimierung: Algorithmus"; [KinModell] (3-43), (3-44); [Reiner2010]
+        (3.63b).
     """
     require_float64("the search of a pose")
     if starts < 1:
@@ -341,7 +345,8 @@ def _nearest_turn(chain, limits, q, near):
         jnp.ceil((limits[0] - q) / turn),
         jnp.floor((limits[1] - q) / turn),
     )
-    return q + jnp.where(_turning(chain), 2 * np.pi * turns, 0.0)
+    moved = q + jnp.where(_turning(chain), 2 * np.pi * turns, 0.0)
+    return jnp.clip(moved, limits[0], limits[1])
 
 
 def _start(chain, limits, number):
