@@ -16,6 +16,7 @@ PACKAGES = (
     "pin",
     "mujoco",
     "mujoco-mjx",
+    "roboticstoolbox-python",
 )
 
 

@@ -14,6 +14,7 @@ LINES = {
     5: "compilation, first row of the main job",
     6: "growth: linear in samples and cases, at most quadratic in coordinates",
     7: "equal to the reference routes",
+    8: "numeric inverse kinematics: 99.9 % of all poses within limits, 32 starts",
 }
 COLUMNS = (
     "name",

@@ -76,6 +76,10 @@ SUITE: dict[str, tuple[Case, ...]] = {
         Case("cases_asim"),
         *_one("axes", "elastic"),
     ),
+    "inverse_kinematics": (
+        *_one("kr210", "ur10e", "iiwa14"),
+        Case("kr210_2", devices=2),
+    ),
     "main_job": (Case("both"),),
 }
 

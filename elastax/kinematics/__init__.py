@@ -40,6 +40,27 @@ from ._ik_dls import (
     smallest_singular_value as smallest_singular_value,
     solve_damped as solve_damped,
 )
+from ._ik_evaluate import pose_difference as pose_difference
+from ._ik_minimise import minimise_pose as minimise_pose
+from ._ik_numeric import (
+    NumericSolution as NumericSolution,
+    singular_distance as singular_distance,
+    solve_pose as solve_pose,
+)
+from ._ik_restarts import (
+    FoundPose as FoundPose,
+    PoseSearch as PoseSearch,
+    SearchResults as SearchResults,
+    find_pose as find_pose,
+)
+from ._ik_steps import (
+    AbstractStep as AbstractStep,
+    DampedStep as DampedStep,
+    ErrorDampedStep as ErrorDampedStep,
+    PseudoInverseStep as PseudoInverseStep,
+    RestPostureStep as RestPostureStep,
+    limit_step as limit_step,
+)
 from ._jacobian import (
     jacobian as jacobian,
     jacobian_derivatives as jacobian_derivatives,
@@ -65,6 +86,10 @@ from ._parameters import (
     ChainParameters as ChainParameters,
     Parameter as Parameter,
     parameter_jacobian as parameter_jacobian,
+)
+from ._redundancy import (
+    hard_and_soft as hard_and_soft,
+    weighted_correction as weighted_correction,
 )
 from ._se3 import (
     inverse_transform as inverse_transform,

@@ -211,8 +211,8 @@ def solve_damped(
         [Reiner2010] (3.57), (3.70), (3.71).
     """
     axes = tuple(range(chain.number)) if axes is None else tuple(axes)
-    _check_indices("axes", axes, chain.number)
-    _check_indices("rows", rows, 6)
+    check_indices("axes", axes, chain.number)
+    check_indices("rows", rows, 6)
     moving, counted = np.array(axes), np.array(rows)
     length = jnp.asarray(characteristic_length, q.dtype)
     weights = jax.lax.stop_gradient(row_weights(length, rows))
@@ -284,7 +284,8 @@ def _resting(q: PerJoint, moving: np.ndarray) -> PerJoint:
     return change.at[moving].set(0.0)
 
 
-def _check_indices(name: str, indices: tuple[int, ...], number: int) -> None:
+def check_indices(name: str, indices: tuple[int, ...], number: int) -> None:
+    """Raise `ValueError` unless the indices are distinct and below `number`."""
     distinct = len(set(indices)) == len(indices) > 0
     if not (distinct and all(0 <= index < number for index in indices)):
         raise ValueError(
