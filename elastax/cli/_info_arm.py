@@ -95,12 +95,11 @@ def joint_table(arm: Arm, zero: Geometry) -> str:
 
 def frame_lines(arm: Arm, zero: Geometry) -> str:
     """Base and tool."""
-    chain = arm.chain
     return "\n".join(
         [
-            f"base: {_pose(np.asarray(chain.base))} of the base frame",
-            f"tool at q = 0: {_pose(zero.tool)} of the base frame",
-            "chain angle = sign * maker's angle + zero; roll, pitch, yaw about x, y, z",
+            f"base: {_pose(np.asarray(arm.chain.base))}",
+            f"tool at q = 0: {_pose(zero.tool)}",
+            "chain angle = sign * maker's angle + zero",
         ]
     )
 
@@ -132,9 +131,12 @@ def inverse_lines(arm: Arm, zero: Geometry) -> list[str]:
     try:
         SphericalWrist.from_chain(arm.chain)
     except ValueError as error:
-        reason = str(error).split(":")[0]
+        reason = str(error).split(":")[0].replace("`chain`", "the arm")
+        if arm.chain.number != 6:
+            reason = f"the arm has {arm.chain.number} joints"
         return [
             f"wrist: {_wrist(arm, zero)}",
+            *_parallel(arm, zero),
             "inverse kinematics: iterative (`solve_damped`); the closed form of a "
             f"spherical wrist does not apply: {reason}",
         ]
@@ -147,12 +149,13 @@ def inverse_lines(arm: Arm, zero: Geometry) -> list[str]:
 
 def pose_table(arm: Arm) -> str:
     """Tool and distance from singularities at the named poses."""
-    lengths = np.linalg.norm(np.diff(geometry(arm.chain, arm.zeros).origins, axis=0))
+    lengths = np.linalg.norm(
+        np.diff(geometry(arm.chain, arm.zeros).origins, axis=0), axis=1
+    )
     scale = max(float(np.sum(lengths)), 1e-3)
     rows = []
     for name, angles in arm.poses.items():
         here = geometry(arm.chain, arm.from_maker(angles))
-        rpy = np.rad2deg(rpy_of(here.tool[:3, :3]))
         scaled = (
             jacobian_of(arm.chain, here) / np.array([scale] * 3 + [1.0] * 3)[:, None]
         )
@@ -161,7 +164,7 @@ def pose_table(arm: Arm) -> str:
             [
                 name,
                 _point(here.tool[:3, 3]),
-                " ".join(f"{angle:8.2f}" for angle in rpy),
+                " ".join(f"{angle:8.2f}" for angle in _degrees(here.tool)),
                 f"{values[-1]:.4f}",
             ]
         )
@@ -231,8 +234,8 @@ def _at(arm: Arm, joint: int, angle: float, per_turn: int = 2) -> str:
 
 def _wrist(arm: Arm, zero: Geometry) -> str:
     """What the last three axes do to each other."""
-    if arm.chain.number < 3 or JointKind.PRISMATIC in arm.chain.kinds[-3:]:
-        return "none of three turning axes"
+    if arm.chain.number < 6 or JointKind.PRISMATIC in arm.chain.kinds[-3:]:
+        return "none of three turning axes behind three others"
     p, a = zero.origins[-3:], zero.axes[-3:]
     size = max(float(np.ptp(zero.origins)), 1e-9)
     first, second = (distance(p[k], a[k], p[k + 1], a[k + 1]) for k in (0, 1))
@@ -240,9 +243,19 @@ def _wrist(arm: Arm, zero: Geometry) -> str:
     if max(first, second, third) < SAME * size and meet(p, a, size):
         return "spherical, the last three axes meet in one point"
     return (
-        f"offset, the last three axes pass each other at {first:.4f} and "
-        f"{second:.4f} m, the outer two at {third:.4f} m (at q = 0)"
+        "offset, the last three axes do not meet in one point: neighbours pass each "
+        f"other at {first:.4f} and {second:.4f} m, the outer two at {third:.4f} m"
     )
+
+
+def _parallel(arm: Arm, zero: Geometry) -> list[str]:
+    """Runs of neighbouring axes that are parallel."""
+    runs = [[0]]
+    for k in range(1, arm.chain.number):
+        parallel = np.linalg.norm(np.cross(zero.axes[k - 1], zero.axes[k])) < SAME
+        runs = [*runs[:-1], [*runs[-1], k]] if parallel else [*runs, [k]]
+    names = [", ".join(arm.axis_names[k] for k in run) for run in runs if len(run) > 1]
+    return [f"parallel axes: {run}" for run in names]
 
 
 def _point(position: np.ndarray) -> str:
@@ -253,7 +266,12 @@ def _direction(axis: np.ndarray) -> str:
     return " ".join(f"{x + 0.0:6.3f}" for x in np.round(axis, 10))
 
 
+def _degrees(pose: np.ndarray) -> np.ndarray:
+    """Roll, pitch, yaw, without what rounding leaves beside zero."""
+    return np.round(np.rad2deg(rpy_of(pose[:3, :3])), 8) + 0.0
+
+
 def _pose(pose: np.ndarray) -> str:
-    rpy = np.round(np.rad2deg(rpy_of(pose[:3, :3])), 8) + 0.0
-    angles = " ".join(f"{angle:g}" for angle in rpy)
-    return f"at {' '.join(_point(pose[:3, 3]).split())} m, turned by {angles} deg"
+    angles = " ".join(f"{angle:g}" for angle in _degrees(pose))
+    place = " ".join(_point(pose[:3, 3]).split())
+    return f"{place} m, roll pitch yaw {angles} deg in the base frame"

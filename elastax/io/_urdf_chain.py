@@ -210,7 +210,7 @@ def _path(file: UrdfFile, base, tip, notes: list[str]) -> list:
         raise ValueError(f"{file.label}: no joint lies behind `{base}`")
     rank = lambda path: (sum(j.type != "fixed" for j in path), len(path))
     best = max(paths, key=rank)
-    rivals = [p[-1].child for p in paths if rank(p)[0] == rank(best)[0]]
+    rivals = [p[-1].child for p in paths if rank(p) == rank(best)]
     if len(rivals) > 1:
         notes.append(
             f"the chain ends at `{best[-1].child}`; as many joints move to "
@@ -257,17 +257,13 @@ def _left_out(file: UrdfFile, path: list, moving: list[Moving]) -> list[str]:
     """What of the file the chain does not show."""
     notes = []
     on_path = {joint.name for joint in path}
-    in_front = {joint.name for joint in _above(file, path[0].parent)}
+    # a base that was named may lie behind joints
+    on_path |= {joint.name for joint in _above(file, path[0].parent)}
     for joint in file.robot.joints:
         if joint.name in on_path or joint.type == "fixed":
             continue
-        if joint.name in in_front:
-            notes.append(
-                f"{file.where('joint', joint.name)} lies in front of the base and "
-                "stands still"
-            )
-        elif not any(
-            a.type != "fixed" and a.name not in on_path | in_front
+        if not any(
+            a.type != "fixed" and a.name not in on_path
             for a in _above(file, joint.parent)
         ):
             notes.append(

@@ -168,7 +168,7 @@ def _check_tree(root, label: str, parents: dict[str, str]) -> None:
         raise refusal(
             label,
             root,
-            f"exactly one link must have no joint in front, but it is {what}",
+            f"one link only must have no joint in front, but there is {what}",
         )
     # every other link has one parent: those that the root does not reach form a ring
     above = {
