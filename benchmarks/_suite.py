@@ -76,6 +76,7 @@ SUITE: dict[str, tuple[Case, ...]] = {
         Case("cases_asim"),
         *_one("axes", "elastic"),
     ),
+    "urdf_kinematics": _one("kr210", "ur10e", "iiwa14"),
     "main_job": (Case("both"),),
 }
 
