@@ -11,25 +11,25 @@ from numpy.typing import ArrayLike
 from ._style import CYCLE, INK, add_legend, new_figure
 
 
-_HAND = 0.35  # length of the bar that shows an axis [m]
+_HAND = 0.45  # length of the arrow along an axis [m]
 _REFUSED = "#b0b0b0"
 
 
 def plot_branches(
     points: ArrayLike,
-    bars: ArrayLike,
+    arrows: ArrayLike,
     angles: ArrayLike,
     allowed: ArrayLike,
     *,
     names: Sequence[str],
-    view: tuple[float, float] = (-55.0, 20.0),
+    view: tuple[float, float] = (-20.0, 18.0),
     title: str = "Branches of one pose",
 ) -> Figure:
     """Arms that all hold the same pose, one panel each.
 
     Args:
         points: along each arm, from the base to the tool, shape (branches, k, 3) [m].
-        bars: axis that tells flipped wrists apart, drawn through the last point but
+        arrows: axis that tells flipped wrists apart, drawn from the last point but
             one, shape (branches, 3).
         angles: in the maker's sense [rad], shape (branches, axes).
         allowed: whether the limits hold, shape (branches,); others are drawn in grey.
@@ -37,13 +37,13 @@ def plot_branches(
         view: azimuth and height of the eye [deg].
         title: of the figure.
     """
-    points, bars = np.asarray(points, float), np.asarray(bars, float)
+    points, arrows = np.asarray(points, float), np.asarray(arrows, float)
     degrees = np.rad2deg(np.asarray(angles, float))
     onto = _projection(*view)
     flat = points @ onto.T
     columns = 4
     rows = -(-len(points) // columns)
-    figure, panels = new_figure(title, rows, columns, 1.2 + 2.9 * rows, width=11.0)
+    figure, panels = new_figure(title, rows, columns, 0.9 + 3.4 * rows, width=11.0)
     panels = np.ravel(panels)
     span = flat.reshape(-1, 2)
     for k, panel in enumerate(panels):
@@ -55,22 +55,24 @@ def plot_branches(
         panel.plot(*flat[k].T, "-", color=colour, lw=3.5, solid_capstyle="round")
         panel.plot(*flat[k].T, "o", color="white", mec=colour, ms=5, mew=1.4)
         centre = points[k, -2]
-        ends = np.stack([centre - _HAND * bars[k] / 2, centre + _HAND * bars[k]])
-        panel.plot(*(ends @ onto.T).T, color=INK, lw=1.5)
+        tip = (centre + _HAND * arrows[k]) @ onto.T
+        arrow = {"arrowstyle": "-|>", "color": INK, "lw": 1.4, "shrinkA": 0}
+        panel.annotate("", tuple(tip), tuple(flat[k, -2]), arrowprops=arrow)
         panel.plot(*flat[k, -1:].T, "*", color=INK, ms=9)
         panel.set_title(names[k], fontsize=9, loc="left", color=INK)
-        note = " ".join(f"{angle:.0f}°" for angle in degrees[k])
-        suffix = "" if np.asarray(allowed)[k] else "\nbeyond a limit"
-        panel.set_xlabel(note + suffix, fontsize=8.5)
+        note = "  ".join(f"{angle + 0.0:.0f}°" for angle in np.round(degrees[k]))
+        suffix = " " if np.asarray(allowed)[k] else "beyond a limit"
+        panel.set_xlabel(f"{note}\n{suffix}", fontsize=8.5)
         panel.set_aspect("equal")
         panel.set_xlim(span[:, 0].min() - 0.3, span[:, 0].max() + 0.3)
         panel.set_ylim(span[:, 1].min() - 0.3, span[:, 1].max() + 0.3)
         panel.set_xticks([])
         panel.set_yticks([])
         panel.spines[["left", "bottom"]].set_visible(False)
-    bar = Line2D([], [], color=INK, lw=1.5)
+    arrow = Line2D([], [], color=INK, lw=1.4, marker=">", markevery=[1], ms=6)
+    arrow.set_data([0, 1], [0, 0])
     star = Line2D([], [], color=INK, marker="*", ls="", ms=9)
-    add_legend(figure, [bar, star], ["positive sense of axis 5", "tool"])
+    add_legend(figure, [arrow, star], ["axis 5", "tool"])
     return figure
 
 
@@ -126,7 +128,8 @@ def plot_branch_path(
         Line2D([], [], color=_colour(k), lw=2.0 if k % 2 == 0 else 1.2)
         for k in range(len(degrees))
     ]
-    add_legend(figure, handles, list(branch_names), columns=4)
+    handles.append(Line2D([], [], color=INK, lw=0.8, ls=(0, (5, 3))))
+    add_legend(figure, handles, [*branch_names, "limit"], columns=5)
     return figure
 
 

@@ -33,7 +33,12 @@ def plot_reach_section(
         point: of the arm that reaches there.
     """
     points = np.asarray(points, float)
-    figure, axes = new_figure(f"Reach of the {point}, section y = 0", 1, 1, 6.6)
+    lines = [np.asarray(line, float) for line in (sticks or {}).values()]
+    figure, axes = _section(
+        f"Reach of the {point}, section y = 0",
+        np.concatenate([points.reshape(-1, 2), *lines]),
+        legend=0.7,
+    )
     # one colour for all cells: the fold of the map at the stretched arm does not show
     axes.pcolormesh(
         points[..., 0],
@@ -48,7 +53,6 @@ def plot_reach_section(
         x, z = np.asarray(line, float).T
         shade = 0.25 + 0.2 * k
         axes.plot(x, z, "-o", color=str(shade), lw=2.6, ms=5, mec="white", label=name)
-    _plane(axes)
     add_legend(figure, *legend_of(axes), columns=3)
     return figure
 
@@ -59,6 +63,7 @@ def plot_dexterity_section(
     value: ArrayLike,
     *,
     edges: Mapping[str, ArrayLike] | None = None,
+    notes: Mapping[str, tuple[float, float]] | None = None,
     label: str,
     title: str,
 ) -> Figure:
@@ -68,11 +73,15 @@ def plot_dexterity_section(
         x, z: positions [m], shapes (n,) and (m,).
         value: measure, shape (m, n); NaN where nothing is reached.
         edges: curves, by what they are, each of shape (k, 2) [m].
+        notes: remarks, by the text, and where they point to, x and z [m].
         label: of the measure, with its unit.
         title: of the figure.
     """
     value = np.ma.masked_invalid(np.asarray(value, float))
-    figure, axes = new_figure(title, 1, 1, 6.6)
+    columns, rows = np.meshgrid(x, z)
+    known = ~np.ma.getmaskarray(value)
+    places = np.stack([columns[known], rows[known]], axis=1)
+    figure, axes = _section(title, places, legend=0.4 if edges else 0.0, bar=1.1)
     top = float(value.max()) if value.count() else 1.0
     drawn = axes.pcolormesh(
         np.asarray(x),
@@ -88,7 +97,17 @@ def plot_dexterity_section(
         levels = np.linspace(0.0, top, 9)[1:-1]
         axes.contour(x, z, value, levels=levels, colors="white", linewidths=0.5)
     _edges(axes, edges or {})
-    _plane(axes)
+    for text, place in (notes or {}).items():
+        axes.annotate(
+            text,
+            place,
+            (22, 26),
+            textcoords="offset points",
+            fontsize=8.5,
+            color=INK,
+            bbox={"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.5},
+            arrowprops={"arrowstyle": "-", "color": INK, "lw": 0.8, "shrinkB": 0},
+        )
     bar = figure.colorbar(drawn, ax=axes, pad=0.02, aspect=30)
     bar.set_label(label, fontsize=9.5)
     bar.ax.tick_params(labelsize=8.5)
@@ -103,11 +122,34 @@ def _edges(axes: Axes, edges: Mapping[str, ArrayLike]) -> None:
         axes.plot(x, z, color=CYCLE[k % len(CYCLE)], lw=1.8, label=name)
 
 
-def _plane(axes: Axes) -> None:
-    """Axis 1, the floor, one scale for both directions."""
+def _section(
+    title: str,
+    points: np.ndarray,
+    *,
+    legend: float | int = 0.0,
+    bar: float | int = 0.0,
+) -> tuple[Figure, Axes]:
+    """Figure of the x-z plane of the size of its content: axis 1, floor, one scale.
+
+    Args:
+        title: of the figure.
+        points: that must be inside, shape (k, 2) [m].
+        legend, bar: room for what stands below and beside [inch].
+    """
+    inside = np.concatenate([points, np.zeros((1, 2))])
+    low, high = inside.min(axis=0), inside.max(axis=0)
+    room = 0.05 * float(np.max(high - low)) + 1e-3
+    wide, tall = high - low + 2 * room
+    width = float(np.clip(5.6 * wide / tall, 4.0, 8.5))
+    figure, axes = new_figure(
+        title, 1, 1, width * tall / wide + 0.9 + legend, width=width + 0.8 + bar
+    )
     axes.axvline(0.0, color=INK, lw=0.7, ls=(0, (6, 3, 1, 3)))
     axes.axhline(0.0, color=_GROUND, lw=1.2, zorder=0.5)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.margins(0.04)
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_autoscale_on(False)
+    axes.set_xlim(low[0] - room, high[0] + room)
+    axes.set_ylim(low[1] - room, high[1] + room)
     axes.set_xlabel("x [m]")
     axes.set_ylabel("z [m]")
+    return figure, axes
