@@ -201,7 +201,7 @@ def test_example_shows_every_key():
     assert not [key for key in keys if not re.search(rf"\b{key}\b", text)]
 
 
-# --------------------------------------------------------------------------- what is told
+# ------------------------------------------------------------------------ what is told
 
 
 def told(source, **options) -> str:
@@ -256,15 +256,28 @@ TENSOR = '<inertia ixx="0.15" ixy="0" ixz="0" iyy="0.9" iyz="0" izz="0.9"/>'
             ("1 <visual>, 1 <collision> (with 1 meshes, never loaded)",),
         ),
         (
-            [('<joint name="A2" type="revolute">', '<joint name="A2" type="continuous">')],
+            [
+                (
+                    '<joint name="A2" type="revolute">',
+                    '<joint name="A2" type="continuous">',
+                )
+            ],
             ("joint `A2` (line 23) is continuous", "two turns"),
         ),
         (
-            [('velocity="3.141592653589793" effort="0"/>', 'velocity="3" effort="9"/>'
-              '<mimic joint="A1"/><dynamics damping="0.5"/>')],
+            [
+                (
+                    'velocity="3.141592653589793" effort="0"/>',
+                    'velocity="3" effort="9"/>'
+                    '<mimic joint="A1"/><dynamics damping="0.5"/>',
+                )
+            ],
             ("`A3` (line 38) mimics `A1`", "<dynamics> of A3", "`effort` limits"),
         ),
-        ([('<mass value="25"/>', '<mass value="0"/>')], ("`link arm` (line 30) has no",)),
+        (
+            [('<mass value="25"/>', '<mass value="0"/>')],
+            ("`link arm` (line 30) has no",),
+        ),
         (
             [(TENSOR, TENSOR.replace('"0.15"', '"0"'))],
             ("must be positive definite", "0, 0.9, 0.9"),
@@ -273,10 +286,13 @@ TENSOR = '<inertia ixx="0.15" ixy="0" ixz="0" iyy="0.9" iyz="0" izz="0.9"/>'
             [(TENSOR, TENSOR.replace('izz="0.9"', 'izz="1.2"'))],
             ("link `link arm` (line 30): no body has", "0.15, 0.9, 1.2"),
         ),
-        ([('<axis xyz="0 0 1"/>', '<axis xyz="0 0 2"/>')], ("length 2 and was scaled",)),
+        (
+            [('<axis xyz="0 0 1"/>', '<axis xyz="0 0 2"/>')],
+            ("length 2 and was scaled",),
+        ),
         ([("0.6 0 0", "600 0 0")], ("600", "millimetres", "mixed")),
     ],
-)  # fmt: skip
+)
 def test_one_warning_tells(changes, words):
     text = told(edited(*changes))
     for word in words:
@@ -296,7 +312,7 @@ def test_base_behind_a_joint():
     assert arm.axis_names == ("A2", "A3")
 
 
-# -------------------------------------------------------------------------- what is refused
+# --------------------------------------------------------------------- what is refused
 
 
 @pytest.mark.parametrize(
@@ -306,34 +322,74 @@ def test_base_behind_a_joint():
         ([("</robot>", "")], "is no valid XML"),
         ([("<robot", "<sdf"), ("</robot>", "</sdf>")], "line 6: must hold <robot>"),
         ([('name="example arm"', "")], "line 6: <robot> must have a name"),
-        ([('xyz="0 0 0.2"', 'xyz="0 0.2"')], "line 11: joint `A1`: `xyz` of <origin> must"
-         ' be three numbers, but is "0 0.2"'),
-        ([('rpy="0 0 0"', 'rpy="0 ${pi} 0"')], r"`rpy` of <origin> must be three numbers"),
+        (
+            [('xyz="0 0 0.2"', 'xyz="0 0.2"')],
+            "line 11: joint `A1`: `xyz` of <origin> must"
+            ' be three numbers, but is "0 0.2"',
+        ),
+        (
+            [('rpy="0 0 0"', 'rpy="0 ${pi} 0"')],
+            r"`rpy` of <origin> must be three numbers",
+        ),
         ([('<axis xyz="0 0 1"/>', '<axis xyz="0 0 0"/>')], "the axis must not be zero"),
-        ([('type="revolute"', 'type="hinge"')], "line 8: joint `A1`: the type must be one"),
+        (
+            [('type="revolute"', 'type="hinge"')],
+            "line 8: joint `A1`: the type must be one",
+        ),
         ([('<parent link="base_link"/>', "")], "line 8: joint `A1` must have <parent"),
-        ([('<child link="forearm"/>', '<child link="arm"/>')], "line 40: joint `A3`: the "
-         "child link `arm` is not there"),
-        ([('<link name="flange"/>', '<link name="forearm"/>')], "`forearm` is there twice"),
+        (
+            [('<child link="forearm"/>', '<child link="arm"/>')],
+            "line 40: joint `A3`: the child link `arm` is not there",
+        ),
+        (
+            [('<link name="flange"/>', '<link name="forearm"/>')],
+            "`forearm` is there twice",
+        ),
         ([('name="A2"', 'name="A1"')], "line 23: the joint `A1` is there twice"),
-        ([('<child link="forearm"/>', '<child link="link arm"/>')], "line 38: joint `A3` "
-         "must not have the child `link arm`, which joint `A2` has already"),
+        (
+            [('<child link="forearm"/>', '<child link="link arm"/>')],
+            "line 38: joint `A3` "
+            "must not have the child `link arm`, which joint `A2` has already",
+        ),
         ([("</robot>", '<link name="alone"/></robot>')], "base_link, alone"),
         ([('<parent link="carousel"/>', '<parent link="flange"/>')], "form a ring"),
-        ([('<mass value="40"/>', "")], "line 16: link `carousel`: <inertial> must have <m"),
-        ([('<mass value="40"/>', '<mass value="-1"/>')], "line 18: link `carousel`: the ma"),
-        ([('ixx="0.8"', "")], "line 19: link `carousel`: `ixx` of <inertia> must be a num"),
-        ([('iyy="0.9"', 'iyy="inf"')], '`iyy` of <inertia> must be a number, but is "inf"'),
-        ([('lower="-2.0943951023931953"', 'lower="2"')], "line 23: joint `A2` must have an "
-         "upper limit above the lower one, but has 1.0472 and 2"),
-        ([('velocity="3.141592653589793"', "")], "`A3` must have a positive limit `vel"),
-        ([('velocity="3.141592653589793"', 'velocity="0"')], "`velocity` [rad/s] or [m/s],"
-         " but has 0"),
+        (
+            [('<mass value="40"/>', "")],
+            "line 16: link `carousel`: <inertial> must have <m",
+        ),
+        (
+            [('<mass value="40"/>', '<mass value="-1"/>')],
+            "line 18: link `carousel`: the ma",
+        ),
+        (
+            [('ixx="0.8"', "")],
+            "line 19: link `carousel`: `ixx` of <inertia> must be a num",
+        ),
+        (
+            [('iyy="0.9"', 'iyy="inf"')],
+            '`iyy` of <inertia> must be a number, but is "inf"',
+        ),
+        (
+            [('lower="-2.0943951023931953"', 'lower="2"')],
+            "line 23: joint `A2` must have an "
+            "upper limit above the lower one, but has 1.0472 and 2",
+        ),
+        (
+            [('velocity="3.141592653589793"', "")],
+            "`A3` must have a positive limit `vel",
+        ),
+        (
+            [('velocity="3.141592653589793"', 'velocity="0"')],
+            "`velocity` [rad/s] or [m/s], but has 0",
+        ),
         ([('type="revolute"', 'type="planar"')], "joint `A1` is planar"),
         ([("<robot", '<!DOCTYPE robot [<!ENTITY a "b">]><robot')], "DOCTYPE"),
-        ([("</robot>", '<x:a xmlns:x="http://www.ros.org/wiki/xacro"/></robot>')], "xacro"),
+        (
+            [("</robot>", '<x:a xmlns:x="http://www.ros.org/wiki/xacro"/></robot>')],
+            "xacro",
+        ),
     ],
-)  # fmt: skip
+)
 def test_refusal_names_the_line(changes, message):
     with pytest.raises(ValueError, match=re.escape(message)) as error:
         arm_from_urdf(edited(*changes))
