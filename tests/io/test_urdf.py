@@ -300,11 +300,21 @@ def test_one_warning_tells(changes, words):
 
 
 def test_equal_tips_are_told():
-    two = BRANCH.replace("prismatic", "fixed").replace("revolute", "fixed")
-    two = two.replace("base_link", "forearm")
-    text = told(edited(("</robot>", two)))
-    assert "the chain ends at `nail link`; as many joints move to `flange`" in text
-    assert "ends at" not in told(edited(("</robot>", two)), tip="flange")
+    other = """<joint name="f" type="fixed"><parent link="forearm"/><child link="eye"/>
+    </joint><link name="eye"/></robot>"""
+    text = told(edited(("</robot>", other)))
+    assert "the chain ends at `flange`; as many joints move to `eye`" in text
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert_close(
+            arm_from_urdf(edited(("</robot>", other)), tip="eye").chain.tool,
+            np.eye(4),
+            rtol=0,
+        )
+        # a tip behind more fixed joints is meant, nobody needs to be asked
+        hand = other.replace("eye", "hand").replace('"f"', '"g"')
+        longer = hand.replace('parent link="forearm"', 'parent link="flange"')
+        arm_from_urdf(edited(("</robot>", longer)))
 
 
 def test_base_behind_a_joint():
