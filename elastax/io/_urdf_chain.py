@@ -10,8 +10,8 @@ from ..kinematics import JointKind
 from ._urdf_file import UrdfFile
 
 
-# of a joint without limits: two turns
-FREE = 2 * np.pi
+# limits of a continuous joint, which need not have any: two turns [rad]; speed [rad/s]
+FREE, FREE_SPEED = 2 * np.pi, np.pi
 # tags beside links and joints, and inside joints, that mean nothing to a chain
 _BESIDE = ("transmission", "gazebo", "ros2_control", "sensor")
 _INSIDE = ("safety_controller", "calibration")
@@ -150,9 +150,12 @@ def limits_of(chain: UrdfChain) -> tuple[np.ndarray, np.ndarray, np.ndarray, lis
         speed = None if limit is None else limit.velocity
         if joint.type == "continuous":
             lower, upper = -FREE, FREE
+            put_in = "limits of two turns either way"
+            if not speed:
+                speed, put_in = FREE_SPEED, f"{put_in} and a speed of pi rad/s"
             notes.append(
-                f"{chain.file.where('joint', joint.name)} is continuous: limits of two "
-                "turns either way were put in"
+                f"{chain.file.where('joint', joint.name)} is continuous: {put_in} were "
+                "put in"
             )
         else:
             assert limit is not None, "the file was checked"

@@ -242,11 +242,6 @@ def _check_joint(joint, label: str, names: dict[str, set[str]]) -> None:
         for name in numbers:
             if element is not None and element.get(name) is not None:
                 _number(element, name, label, what)
-    mimic = joint.find("mimic")
-    if mimic is not None and mimic.get("joint") not in names["joint"]:
-        raise refusal(
-            label, mimic, f"{what}: the joint `{mimic.get('joint')}` is not there"
-        )
 
 
 def _check_origin(element, label: str, what: str) -> None:

@@ -39,6 +39,8 @@ def named_robot(name: str | pathlib.Path) -> ElasticRobot:
         return load_robot(name)
     if path.suffix == ".urdf":
         beside = path.with_suffix(".toml")
+        if not path.is_file():
+            raise ValueError(f"{path}: cannot be read: there is no such file")
         if not beside.is_file():
             raise ValueError(
                 f"{path}: a URDF holds no gears, springs or friction: write them into "

@@ -267,6 +267,15 @@ TENSOR = '<inertia ixx="0.15" ixy="0" ixz="0" iyy="0.9" iyz="0" izz="0.9"/>'
         (
             [
                 (
+                    '<joint name="flange fixed" type="fixed">',
+                    '<joint name="flange fixed" type="continuous">',
+                )
+            ],
+            ("`flange fixed` (line 53) is continuous", "and a speed of pi rad/s"),
+        ),
+        (
+            [
+                (
                     'velocity="3.141592653589793" effort="0"/>',
                     'velocity="3" effort="9"/>'
                     '<mimic joint="A1"/><dynamics damping="0.5"/>',
