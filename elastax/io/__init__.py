@@ -18,8 +18,8 @@ from ._urdf import (
     arm_from_urdf as arm_from_urdf,
     robot_from_urdf as robot_from_urdf,
 )
-from ._urdf_chain import UrdfWarning as UrdfWarning
 from ._urdf_export import (
     urdf_from_arm as urdf_from_arm,
     urdf_from_robot as urdf_from_robot,
 )
+from ._urdf_notes import UrdfWarning as UrdfWarning

@@ -31,8 +31,9 @@ from ._robot_parts import (
 )
 from ._toml import load_toml
 from ._urdf_bodies import bodies_of, inertia_doubts
-from ._urdf_chain import UrdfChain, UrdfWarning, limits_of, read_chain
+from ._urdf_chain import UrdfChain, limits_of, read_chain
 from ._urdf_file import read_urdf
+from ._urdf_notes import UrdfWarning
 from ._urdf_schema import ELASTIC
 
 

@@ -1,4 +1,4 @@
-"""The chain of a URDF's tree, and what of the tree and its tags is not taken over."""
+"""The chain between two links of a URDF's tree."""
 
 import dataclasses
 from typing import Any
@@ -8,33 +8,11 @@ import numpy as np
 from .._rpy import pose_of, rotation_of, rpy_of
 from ..kinematics import JointKind
 from ._urdf_file import UrdfFile
+from ._urdf_notes import left_out
 
 
 # limits of a continuous joint, which need not have any: two turns [rad]; speed [rad/s]
 FREE, FREE_SPEED = 2 * np.pi, np.pi
-# tags beside links and joints, and inside joints, that mean nothing to a chain
-_BESIDE = ("transmission", "gazebo", "ros2_control", "sensor")
-_INSIDE = ("safety_controller", "calibration")
-
-
-class UrdfWarning(UserWarning):
-    """What of a URDF was left out, put in, or looks wrong; one for the whole file.
-
-    Attributes:
-        label: the file.
-        notes: one line each.
-    """
-
-    @property
-    def label(self) -> str:
-        return self.args[0]
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        return self.args[1]
-
-    def __str__(self) -> str:
-        return "\n  - ".join([f"{self.label}, left out or doubtful:", *self.notes])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -130,11 +108,11 @@ def read_chain(file: UrdfFile, base: str | None, tip: str | None) -> UrdfChain:
         pose, folded = np.eye(4), False
     if not moving:
         raise ValueError(
-            f"{file.label}: no joint moves between `{base or _root(file)}` and "
-            f"`{tip or _root(file)}`"
+            f"{file.label}: no joint moves between `{path[0].parent}` and "
+            f"`{path[-1].child}`"
         )
     end = path[-1].child
-    notes += _left_out(file, path, moving)
+    notes += left_out(file, path)
     return UrdfChain(file, start, tuple(moving), pose, end, tuple(notes))
 
 
@@ -254,73 +232,3 @@ def _rigid(file: UrdfFile, link: str, pose: np.ndarray) -> list:
         if joint.parent == link and joint.type == "fixed":
             found += _rigid(file, joint.child, pose @ _origin(file, joint))
     return found
-
-
-def _left_out(file: UrdfFile, path: list, moving: list[Moving]) -> list[str]:
-    """What of the file the chain does not show."""
-    notes = []
-    on_path = {joint.name for joint in path}
-    # a base that was named may lie behind joints
-    on_path |= {joint.name for joint in _above(file, path[0].parent)}
-    for joint in file.robot.joints:
-        if joint.name in on_path or joint.type == "fixed":
-            continue
-        if not any(
-            a.type != "fixed" and a.name not in on_path
-            for a in _above(file, joint.parent)
-        ):
-            notes.append(
-                f"{file.where('joint', joint.name)} starts a branch, which was left "
-                f"out with its mass: {', '.join(_behind(file, joint))}"
-            )
-    for m in moving:
-        if m.joint.mimic is not None:
-            notes.append(
-                f"{file.where('joint', m.joint.name)} mimics `{m.joint.mimic.joint}`, "
-                "but moves on its own here"
-            )
-    notes += _tags(file, moving)
-    return notes
-
-
-def _above(file: UrdfFile, link: str) -> list:
-    """Joints between the root and a link."""
-    for joint in file.robot.joints:
-        if joint.child == link:
-            return [*_above(file, joint.parent), joint]
-    return []
-
-
-def _behind(file: UrdfFile, joint) -> list[str]:
-    found = [joint.child]
-    for other in file.robot.joints:
-        if other.parent == joint.child:
-            found += _behind(file, other)
-    return found
-
-
-def _rubs(dynamics) -> bool:
-    return dynamics is not None and any(
-        float(value or 0) for value in (dynamics.damping, dynamics.friction)
-    )
-
-
-def _tags(file: UrdfFile, moving: list[Moving]) -> list[str]:
-    """Counts of the tags that mean nothing to a chain."""
-    notes = []
-    rubbing = [m.joint.name for m in moving if _rubs(m.joint.dynamics)]
-    if rubbing:
-        notes.append(
-            f"<dynamics> of {', '.join(rubbing)}: damping and friction are those of "
-            "the file beside the URDF"
-        )
-    if any(m.joint.limit is not None and m.joint.limit.effort for m in moving):
-        notes.append("`effort` limits: an arm has no limits of torque")
-    counts = {tag: len(list(file.root.iter(tag))) for tag in (*_BESIDE, *_INSIDE)}
-    counts |= {tag: len(list(file.root.iter(tag))) for tag in ("visual", "collision")}
-    meshes = len(list(file.root.iter("mesh")))
-    shown = [f"{count} <{tag}>" for tag, count in counts.items() if count]
-    if shown:
-        mesh = f" (with {meshes} meshes, never loaded)" if meshes else ""
-        notes.append(f"not read: {', '.join(shown)}{mesh}")
-    return notes
