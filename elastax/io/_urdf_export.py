@@ -38,7 +38,10 @@ def urdf_from_arm(arm: Arm) -> str:
     Joint names and the numbers of `RPYJoints` are kept to the last digit; orientations
     of other conventions become roll, pitch, yaw, exact to rounding. The angles are the
     chain's; the maker's signs and zeros stand in comments. `effort` is zero: an arm has
-    no limits of torque.
+    no limits of torque. Turning joints without limits are `continuous`.
+
+    Raises:
+        ValueError: limits of another joint, or a speed, that are not finite.
     """
     joints = [
         _Written(
@@ -55,7 +58,8 @@ def urdf_from_robot(robot: ElasticRobot, *, hinges: bool = False) -> str:
     """URDF of the rigid part of an elastic robot: joints, limits, bodies, payload.
 
     The first body behind a joint is its link, further ones are links fixed to it.
-    Gears, springs, dampers, friction and counterbalance have no place in a URDF.
+    Gears, springs, dampers, friction, counterbalance and gravity have no place in a
+    URDF.
 
     Args:
         robot: the robot.
@@ -188,15 +192,12 @@ class _Tree:
         if written.comment:
             text = written.comment.replace("--", "- -")  # not allowed in a comment
             self.element.append(ET.Comment(f" {written.name}: {text} "))
-        kind = self.chain.kinds[k]
-        type_ = "prismatic" if kind is JointKind.PRISMATIC else "revolute"
-        joint = self.joint(written.name, type_, parent, child)
+        kind, range_ = _range(written, self.chain.kinds[k])
+        joint = self.joint(written.name, kind, parent, child)
         _origin(joint, position, rpy)
         ET.SubElement(joint, "axis", xyz=_numbers(axis))
-        lower, upper, speed = map(_number, written.limits)
-        ET.SubElement(
-            joint, "limit", lower=lower, upper=upper, velocity=speed, effort="0"
-        )
+        speed = _number(written.limits[2])
+        ET.SubElement(joint, "limit", {**range_, "velocity": speed, "effort": "0"})
         if written.mimic is not None:
             of, factor = written.mimic
             ET.SubElement(joint, "mimic", joint=of, multiplier=_number(factor))
@@ -211,6 +212,21 @@ class _Tree:
         ET.SubElement(joint, "parent", link=parent)
         ET.SubElement(joint, "child", link=child)
         return joint
+
+
+def _range(written: _Written, kind: JointKind) -> tuple[str, dict[str, str]]:
+    """Type of a joint, and its limits; a turning one may have none."""
+    lower, upper, speed = written.limits
+    turns = kind is JointKind.REVOLUTE
+    if turns and np.isinf([lower, upper]).all() and np.isfinite(speed):
+        return "continuous", {}
+    if not np.isfinite(written.limits).all():
+        raise ValueError(
+            f"the limits of `{written.name}` must be finite in a URDF, but are "
+            f"{lower:g} .. {upper:g}, speed {speed:g}"
+        )
+    limits = {"lower": _number(lower), "upper": _number(upper)}
+    return "revolute" if turns else "prismatic", limits
 
 
 def _origin(element: ET.Element, position, rpy) -> None:

@@ -11,7 +11,13 @@ import numpy as np
 import pytest
 import yourdfpy
 from elastax.dynamics import inverse_dynamics
-from elastax.io import arm_from_urdf, robot_from_urdf, urdf_from_arm, urdf_from_robot
+from elastax.io import (
+    UrdfWarning,
+    arm_from_urdf,
+    robot_from_urdf,
+    urdf_from_arm,
+    urdf_from_robot,
+)
 from elastax.kinematics import Arm, forward_kinematics
 from elastax.robots import kr210, manutec_r3
 
@@ -62,6 +68,24 @@ def test_other_conventions_keep_their_poses(build):
     # angles from matrices, to rounding
     assert_close(forward(again.chain, q), forward(arm.chain, q), rtol=0, atol=1e-14)
     assert "A2: this angle = -1 * angle of the maker + 0.1 rad" in text
+
+
+def test_limits_that_are_not_finite():
+    arm = arm_of(mixed())
+    free = dataclasses.replace(
+        arm, lower=arm.lower.at[2].set(-jnp.inf), upper=arm.upper.at[2].set(jnp.inf)
+    )
+    text = urdf_from_arm(free)
+    assert text.count('type="continuous"') == 1 and "inf" not in text
+    with pytest.warns(UrdfWarning, match="A3.* is continuous"):
+        assert_close(arm_from_urdf(text).upper[2], 2 * np.pi, rtol=1e-15)
+    for changes in (
+        {"upper": arm.upper.at[2].set(jnp.inf)},
+        {"lower": arm.lower.at[1].set(-jnp.inf), "upper": arm.upper.at[1].set(jnp.inf)},
+        {"velocity": arm.velocity.at[2].set(jnp.inf)},
+    ):
+        with pytest.raises(ValueError, match="must be finite in a URDF"):
+            urdf_from_arm(dataclasses.replace(arm, **changes))
 
 
 # gears as they may be: the rigid robot has none
