@@ -80,6 +80,7 @@ SUITE: dict[str, tuple[Case, ...]] = {
         *_one("kr210", "ur10e", "iiwa14"),
         Case("kr210_2", devices=2),
     ),
+    "urdf_kinematics": _one("kr210", "ur10e", "iiwa14"),
     "main_job": (Case("both"),),
 }
 

@@ -120,3 +120,25 @@ def tool_jacobian(model: pin.Model, data: pin.Data, x: np.ndarray) -> np.ndarray
     """Geometric Jacobian of the tool in the base frame, translation above rotation."""
     world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     return pin.computeFrameJacobian(model, data, x, model.getFrameId(TOOL), world)
+
+
+def frame_pose(model: pin.Model, data: pin.Data, frame: int, q, qd) -> np.ndarray:
+    """Pose of a frame, (4, 4)."""
+    pin.framesForwardKinematics(model, data, q)
+    return data.oMf[frame].homogeneous.copy()
+
+
+def frame_jacobian(model: pin.Model, data: pin.Data, frame: int, q, qd) -> np.ndarray:
+    """Geometric Jacobian of a frame in the base frame, translation above rotation."""
+    world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    return pin.computeFrameJacobian(model, data, q, frame, world).copy()
+
+
+def frame_jacobian_rate(
+    model: pin.Model, data: pin.Data, frame: int, q, qd
+) -> np.ndarray:
+    """Time derivative of that Jacobian at the joint speeds qd."""
+    world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    pin.computeJointJacobiansTimeVariation(model, data, q, qd)
+    pin.updateFramePlacements(model, data)
+    return pin.getFrameJacobianTimeVariation(model, data, frame, world).copy()

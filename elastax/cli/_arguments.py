@@ -13,7 +13,7 @@ class FeedforwardConfig:
     """What `elastax feedforward` is to do; angles in degrees, as typed.
 
     Attributes:
-        robot: built-in name or TOML file.
+        robot: built-in name, TOML file or URDF.
         pose: named pose or one angle per axis [deg].
         move: angle per axis to move by [deg]; shorter lists leave the rest at rest.
         path: "rectangle" or a CSV file of way-points x, y, z [m], or `None`.
@@ -57,11 +57,14 @@ class InfoConfig:
     """What `elastax info` is to show.
 
     Attributes:
-        robot: built-in name or TOML file.
+        robot: built-in name, TOML file or URDF.
+        base, tip: links of a URDF between which the arm lies; the tree's unless given.
         quiet: whether progress is silent.
     """
 
     robot: str = "kr210"
+    base: str | None = None
+    tip: str | None = None
     quiet: bool = False
 
 
@@ -75,9 +78,17 @@ def parse(argv: list[str] | None) -> tuple[str, FeedforwardConfig | InfoConfig]:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _add_feedforward(commands)
     info = commands.add_parser(
-        "info", help="what a robot is made of, its eigenfrequencies, its sources"
+        "info", help="a robot's kinematics, axes, springs, eigenfrequencies, sources"
     )
-    info.add_argument("robot", nargs="?", default="kr210", help="name or TOML file")
+    info.add_argument(
+        "robot",
+        nargs="?",
+        default="kr210",
+        metavar="NAME|FILE.toml|FILE.urdf",
+        help="the robot; a URDF with gears in the TOML file beside it, or as an arm",
+    )
+    for link in ("base", "tip"):
+        info.add_argument(f"--{link}", metavar="LINK", help=f"{link} link in a URDF")
     info.add_argument("--quiet", action="store_true", help="no progress")
     values = vars(parser.parse_args(argv))
     command = values.pop("command")
@@ -104,7 +115,7 @@ def _add_feedforward(commands) -> None:
         allow_abbrev=False,
     )
     add = parser.add_argument
-    add("--robot", default=default.robot, metavar="NAME|FILE.toml", help="the robot")
+    add("--robot", default=default.robot, metavar="NAME|FILE", help="the robot")
     add(
         "--pose",
         nargs="+",

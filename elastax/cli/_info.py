@@ -1,24 +1,58 @@
 """`elastax info`: what a robot is made of."""
 
+import warnings
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from ..analysis import locked_frequencies
 from ..dynamics import ElasticRobot
-from ..robots import named_robot
+from ..io import UrdfWarning
+from ..kinematics import Arm
+from ..robots import named_model
 from ._arguments import InfoConfig
+from ._info_arm import arm_of, kinematics_text
 from ._progress import Progress
 from ._tables import table
 
 
 def info(config: InfoConfig, progress: Progress) -> int:
-    """Print axes, elastic coordinates, eigenfrequencies, sources and assumptions.
+    """Print kinematics, axes, elastic coordinates, eigenfrequencies, and sources.
+
+    Arms without dynamics show their kinematics only.
 
     Raises:
         ValueError: unknown robot or bad file.
     """
-    robot = named_robot(config.robot)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        model = named_model(config.robot, base=config.base, tip=config.tip)
+    if isinstance(model, Arm):
+        turns = model.chain.number
+        print(f"{model.name}: {turns} joints, kinematics only\n")
+        print(kinematics_text(model), end="\n\n")
+    else:
+        _print_robot(model, progress)
+    lists = [("Sources", model.sources), ("Assumed", model.assumptions)]
+    lists += [
+        (f"Left out of {w.message.label}, or doubtful", w.message.notes)
+        for w in caught
+        if isinstance(w.message, UrdfWarning)
+    ]
+    for title, lines in lists:
+        if lines:
+            print(f"{title}:")
+            print("\n".join(f"  - {line}" for line in lines))
+    for warning in caught:
+        if not isinstance(warning.message, UrdfWarning):
+            warnings.warn_explicit(
+                warning.message, warning.category, warning.filename, warning.lineno
+            )
+    return 0
+
+
+def _print_robot(robot: ElasticRobot, progress: Progress) -> None:
     progress.say("compiling the eigenfrequencies ...")
     mass = float(np.sum(robot.bodies.mass))
     load = float(np.sum(robot.payload.mass))
@@ -26,16 +60,12 @@ def info(config: InfoConfig, progress: Progress) -> int:
         f"{robot.name}: {robot.axes} axes, {robot.elastic} elastic coordinates, "
         f"moving mass {mass:.0f} kg, payload {load:g} kg\n"
     )
+    print(kinematics_text(arm_of(robot)), end="\n\n")
     print(axes_table(robot), end="\n\n")
     if robot.elastic:
         print(structure_table(robot), end="\n\n")
     print("First eigenfrequencies with the motors locked [Hz]")
     print(frequency_table(robot), end="\n\n")
-    for title, lines in (("Sources", robot.sources), ("Assumed", robot.assumptions)):
-        if lines:
-            print(f"{title}:")
-            print("\n".join(f"  - {line}" for line in lines))
-    return 0
 
 
 def axes_table(robot: ElasticRobot) -> str:

@@ -14,3 +14,12 @@ from ._results import (
     write_results as write_results,
 )
 from ._robot_file import load_robot as load_robot, robot_from_table as robot_from_table
+from ._urdf import (
+    arm_from_urdf as arm_from_urdf,
+    robot_from_urdf as robot_from_urdf,
+)
+from ._urdf_export import (
+    urdf_from_arm as urdf_from_arm,
+    urdf_from_robot as urdf_from_robot,
+)
+from ._urdf_notes import UrdfWarning as UrdfWarning

@@ -38,7 +38,7 @@ def inertia_tensor(value, where) -> np.ndarray:
     return tensor
 
 
-_POSE = {"position": Key(vector(3), [0.0] * 3), "rpy_deg": Key(vector(3), [0.0] * 3)}
+POSE = {"position": Key(vector(3), [0.0] * 3), "rpy_deg": Key(vector(3), [0.0] * 3)}
 _FRICTION = table(
     {
         "viscous": Key(not_negative, 0.0),
@@ -47,7 +47,7 @@ _FRICTION = table(
     }
 )
 _NO_FRICTION = {"viscous": 0.0, "coulomb": 0.0, "steepness": 500.0}
-_GEAR = table(
+GEAR = table(
     {
         "ratio": Key(number, meaning="the gear ratio, motor over output"),
         "motor_inertia": Key(positive, meaning="that of the rotor [kg m^2]"),
@@ -71,7 +71,7 @@ _LIMITS = table(
         "jerk": Key(positive),
     }
 )
-_HINGE = table(
+HINGE = table(
     {
         "name": Key(text),
         "axis": Key(vector(3)),
@@ -84,7 +84,7 @@ _HINGE = table(
         "end_slope": Key(number, None),
     }
 )
-_BEAM = table(
+BEAM = table(
     {
         "section": Key(choice("rectangular_tube", "circular_tube")),
         "height": Key(positive, None),
@@ -97,7 +97,7 @@ _BEAM = table(
         "density": Key(positive),
     }
 )
-_MASS = {
+MASS = {
     "mass": Key(positive, meaning="the mass [kg]"),
     "com": Key(vector(3), meaning="the centre of mass [m]"),
     "inertia": Key(
@@ -117,9 +117,9 @@ _AXIS = table(
         "zero_deg": Key(number, 0.0),
         "wrist_centre": Key(flag, False),
         "limits_deg": Key(_LIMITS),
-        "body": Key(table(_MASS)),
-        "gear": Key(_GEAR),
-        "hinges": Key(array_of(_HINGE), []),
+        "body": Key(table(MASS)),
+        "gear": Key(GEAR),
+        "hinges": Key(array_of(HINGE), []),
     }
 )
 _CYLINDER = {
@@ -152,8 +152,8 @@ _CYLINDERS = {
 }
 
 
-def _cylinder(value, where):
-    """The keys depend on `kind`."""
+def cylinder(value, where):
+    """A counterbalance; the keys depend on `kind`."""
     kind = value.get("kind", "") if isinstance(value, dict) else ""
     choice(*_CYLINDERS)(kind, f"{where}.kind")
     return _CYLINDERS[kind](value, where)
@@ -165,12 +165,12 @@ ROBOT = table(
         "sources": Key(array_of(text), []),
         "assumptions": Key(array_of(text), []),
         "gravity": Key(vector(3), [0.0, 0.0, -9.81]),
-        "base": Key(table(_POSE), None),
+        "base": Key(table(POSE), None),
         "axes": Key(array_of(_AXIS, at_least=1)),
-        "beams": Key(named(_BEAM), {}),
-        "counterbalance": Key(_cylinder, None),
-        "payload": Key(table(_MASS), None),
-        "tool": Key(table(_POSE), None),
+        "beams": Key(named(BEAM), {}),
+        "counterbalance": Key(cylinder, None),
+        "payload": Key(table(MASS), None),
+        "tool": Key(table(POSE), None),
         "poses_deg": Key(named(array_of(number)), {}),
     }
 )

@@ -76,6 +76,7 @@ from ._joints import (
     JointKind as JointKind,
     RPYJoints as RPYJoints,
 )
+from ._lengths import length_doubts as length_doubts
 from ._link_conventions import (
     HayatiJoints as HayatiJoints,
     MixedJoints as MixedJoints,

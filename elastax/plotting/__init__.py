@@ -5,6 +5,10 @@ window, no global state. Angles come in radians, lengths in metres; the axes say
 is drawn.
 """
 
+from ._branches import (
+    plot_branch_path as plot_branch_path,
+    plot_branches as plot_branches,
+)
 from ._drives import (
     plot_deformations as plot_deformations,
     plot_torques as plot_torques,
@@ -19,3 +23,7 @@ from ._paths import (
 from ._perturbations import plot_perturbations as plot_perturbations
 from ._recording import plot_recording as plot_recording
 from ._style import save_figure as save_figure
+from ._workspace import (
+    plot_dexterity_section as plot_dexterity_section,
+    plot_reach_section as plot_reach_section,
+)

@@ -5,5 +5,10 @@ from ._kr16 import kr16 as kr16
 from ._kr210 import kr210 as kr210
 from ._kr300 import kr300 as kr300
 from ._manutec_r3 import manutec_r3 as manutec_r3
-from ._named import ROBOTS as ROBOTS, named_robot as named_robot
+from ._named import (
+    ARMS as ARMS,
+    ROBOTS as ROBOTS,
+    named_model as named_model,
+    named_robot as named_robot,
+)
 from ._ur10e import ur10e as ur10e

@@ -8,6 +8,7 @@ from elastax.cli import main
 
 
 EXAMPLE = pathlib.Path(__file__).parents[2] / "examples" / "robot.toml"
+UR10E = str(EXAMPLE.with_name("ur10e.urdf"))
 
 
 @pytest.fixture(autouse=True)
@@ -41,6 +42,8 @@ def edited(tmp_path, old: str, new: str) -> str:
     [
         (("--robot", "kr2100"), ("kr2100", "kr210", ".toml")),
         (("--robot", "nowhere.toml"), ("nowhere.toml",)),
+        (("--robot", "nowhere.urdf"), ("nowhere.urdf", "cannot be read")),
+        (("--robot", UR10E), ("ur10e.urdf", "no gears", "ur10e.toml")),
         (("--pose", "lying"), ("lying", "stretched")),
         (("--pose", "0", "0"), ("one angle per axis",)),
         (("--pose", "0", "-150", "0", "0", "0", "0"), ("A2", "-140")),
