@@ -9,6 +9,14 @@ from ._chain import (
     link_poses as link_poses,
     moving_frames as moving_frames,
 )
+from ._configuration import (
+    FanucConfiguration as FanucConfiguration,
+    KukaConfiguration as KukaConfiguration,
+    fanuc_configuration as fanuc_configuration,
+    fanuc_joint_angles as fanuc_joint_angles,
+    kuka_configuration as kuka_configuration,
+    kuka_joint_angles as kuka_joint_angles,
+)
 from ._damping import (
     AbstractDamping as AbstractDamping,
     ConstantDamping as ConstantDamping,
@@ -31,6 +39,9 @@ from ._ik_analytic import (
     inverse_kinematics_path as inverse_kinematics_path,
     select_branch as select_branch,
 )
+from ._ik_calibrated import (
+    calibrated_inverse_kinematics as calibrated_inverse_kinematics,
+)
 from ._ik_dls import (
     PoseResults as PoseResults,
     PoseSolution as PoseSolution,
@@ -39,6 +50,12 @@ from ._ik_dls import (
     row_weights as row_weights,
     smallest_singular_value as smallest_singular_value,
     solve_damped as solve_damped,
+)
+from ._ik_elastic import geometric_correction as geometric_correction
+from ._ik_planar import (
+    PlanarArm as PlanarArm,
+    planar_inverse as planar_inverse,
+    planar_inverse_geometric as planar_inverse_geometric,
 )
 from ._jacobian import (
     jacobian as jacobian,
@@ -66,6 +83,16 @@ from ._parameters import (
     Parameter as Parameter,
     parameter_jacobian as parameter_jacobian,
 )
+from ._pose_correction import (
+    DeformableArm as DeformableArm,
+    PoseCorrection as PoseCorrection,
+    correct_pose as correct_pose,
+)
+from ._posture import (
+    Posture as Posture,
+    branch_index as branch_index,
+    posture_of as posture_of,
+)
 from ._se3 import (
     inverse_transform as inverse_transform,
     rotation_about as rotation_about,
@@ -76,6 +103,14 @@ from ._se3 import (
     rotation_z as rotation_z,
     transform as transform,
 )
+from ._separation import (
+    MatrixEquation as MatrixEquation,
+    contained_unknowns as contained_unknowns,
+    inverse_by_separation as inverse_by_separation,
+    link_transforms as link_transforms,
+    separated_equation as separated_equation,
+    separated_equations as separated_equations,
+)
 from ._structured import (
     SAME as SAME,
     JointStructure as JointStructure,
@@ -85,3 +120,4 @@ from ._structured import (
     placements as placements,
     structured as structured,
 )
+from ._wrist_weights import WristWeights as WristWeights
