@@ -153,7 +153,8 @@ def fanuc_joint_angles(
 ) -> tuple[Float[Array, "6"], Bool[Array, ""]]:
     """Joint angles that the letters and turns select among those that reach a pose.
 
-    The axes whose turns are not counted take the angle in [-180, 180) degrees.
+    The axes whose turns are not counted take the angle in [-180, 180) degrees, or the
+    one a turn away where only that one keeps the limits.
 
     Args:
         arm: a Fanuc arm with a spherical wrist.
@@ -172,9 +173,14 @@ def fanuc_joint_angles(
     q, valid = _branch(arm, pose, posture, previous, wrist_weights)
     angles = arm.to_maker(q)
     angles = angles - 2 * np.pi * _turns(angles)
+    q = arm.from_maker(angles)
+    for turn in (2 * np.pi, -2 * np.pi):
+        inside = (q + turn >= arm.lower) & (q + turn <= arm.upper)
+        outside = (q < arm.lower) | (q > arm.upper)
+        q = jnp.where(inside & outside, q + turn, q)
     turns = configuration.turns.astype(angles.dtype)
-    angles = angles.at[_TURN_AXES].add(2 * np.pi * turns)
-    return _within(arm, angles, valid)
+    counted = angles[_TURN_AXES] + 2 * np.pi * turns
+    return _within(arm, arm.to_maker(q).at[_TURN_AXES].set(counted), valid)
 
 
 def _branch(arm, pose, posture, previous, weights):

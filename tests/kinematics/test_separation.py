@@ -27,6 +27,8 @@ def chain():
 
 
 solve = jax.jit(inverse_by_separation)
+solve_generally = jax.jit(inverse_kinematics)
+find_unknowns = jax.jit(contained_unknowns, static_argnames=("left", "right"))
 
 
 @pytest.mark.parametrize("case", load_vectors("003 (3-45)-(3-97)"), ids="12")
@@ -136,17 +138,17 @@ def alone(unknowns):
 def test_the_search_finds_the_steps_of_the_text(chain):
     """Which equation holds one unknown only, step after step."""
     # no inversion: every element of the position holds several
-    unknowns = np.asarray(contained_unknowns(chain))
+    unknowns = np.asarray(find_unknowns(chain))
     assert alone(unknowns) == {}
     # one from each side, (3-57): the third row of the position is (3-60), theta_1 alone
-    unknowns = np.asarray(contained_unknowns(chain, left=1, right=1))
+    unknowns = np.asarray(find_unknowns(chain, left=1, right=1))
     assert alone(unknowns) == {(2, 3): 0}
     # its other rows hold theta_1 to theta_3: two equations for two unknowns are left
     assert set(np.flatnonzero(unknowns[0, 3])) == {0, 1, 2}
     assert set(np.flatnonzero(unknowns[1, 3])) == {1, 2}
     # three from the left, (3-84): with theta_1 to theta_3 known, element 33 holds
     # theta_5 alone, the third column theta_4 in addition, the third row theta_6
-    unknowns = np.asarray(contained_unknowns(chain, left=3))[:, :, 3:]
+    unknowns = np.asarray(find_unknowns(chain, left=3))[:, :, 3:]
     assert alone(unknowns)[2, 2] == 1
     assert unknowns[0, 2].tolist() == unknowns[1, 2].tolist() == [True, True, False]
     assert unknowns[2, 0].tolist() == unknowns[2, 1].tolist() == [False, True, True]
@@ -154,7 +156,7 @@ def test_the_search_finds_the_steps_of_the_text(chain):
 
 def test_planar_arm_is_separated_as_well():
     """One inversion leaves the second angle alone in the rotation."""
-    unknowns = np.asarray(contained_unknowns(planar(1.0, 0.7), left=1))
+    unknowns = np.asarray(find_unknowns(planar(1.0, 0.7), left=1))
     # the constant third row and column hold nothing
     assert not np.any(unknowns[2]) or set(alone(unknowns).values()) <= {0, 1}
     assert unknowns[0, 3].tolist() == [True, True]
@@ -179,7 +181,7 @@ def test_gradient(chain):
 def test_out_of_reach_is_masked_and_finite(chain, position):
     pose = jnp.eye(4).at[:3, 3].set(jnp.array(position))
     solutions, valid = solve(chain, pose)
-    general, masks = inverse_kinematics(SphericalWrist.from_chain(chain), pose)
+    _, masks = solve_generally(SphericalWrist.from_chain(chain), pose)
     assert valid.tolist() == masks.tolist()
     assert np.all(np.isfinite(solutions))
     slopes = jax.jit(jax.jacrev(lambda pose: inverse_by_separation(chain, pose)[0]))
