@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
-from .._custom_types import PerElastic, PerJoint, Scalar, Vector3
+from .._custom_types import PerElastic, Scalar, Vector3
 from .._taylor import leading
 from ._chain import moving_frames
 from ._damping import attenuate
-from ._pose_correction import DeformableArm
+from ._pose_correction import DeformableArm, PerAxis
 from ._safe_angles import root
 
 
@@ -27,11 +27,11 @@ class _Points(NamedTuple):
 
 def geometric_correction(
     arm: DeformableArm,
-    q: PerJoint,
+    q: PerAxis,
     eta: PerElastic,
     *,
     steepness: Scalar | float = 1e3,
-) -> PerJoint:
+) -> PerAxis:
     r"""Axes 1 to 3 moved so that the tool of the deformed arm stays nearly in place.
 
     Each step measures, in the frame of an axis (z along the axis, x along its
@@ -94,7 +94,7 @@ def geometric_correction(
     return q.at[2].add(third).at[0].add(first)
 
 
-def _points(arm: DeformableArm, q: PerJoint, eta: PerElastic) -> _Points:
+def _points(arm: DeformableArm, q: PerAxis, eta: PerElastic) -> _Points:
     frames = moving_frames(arm.chain, arm.coordinates(q, eta))
     pick = lambda x: tuple(leading(x)[k] for k in arm.axis_joints)
     return _Points(

@@ -21,6 +21,7 @@ from ._safe_angles import root
 from ._se3 import transform
 
 
+PerAxis = Float[Array, " axes"]
 _ALL_ROWS = (0, 1, 2, 3, 4, 5)
 
 
@@ -62,12 +63,12 @@ class DeformableArm(eqx.Module):
         """Number of driven axes."""
         return len(self.axis_joints)
 
-    def coordinates(self, q: PerJoint, eta: PerElastic) -> PerJoint:
+    def coordinates(self, q: PerAxis, eta: PerElastic) -> PerJoint:
         """Coordinates of all joints of the chain [rad] or [m]."""
         return self.coupling @ jnp.concatenate([q, eta])
 
     def tool(
-        self, q: PerJoint, eta: PerElastic
+        self, q: PerAxis, eta: PerElastic
     ) -> tuple[Transform, Float[Array, "6 axes"]]:
         """Pose of the tool [m] and its geometric Jacobian by the axes [m/rad]."""
         pose, matrix = _pose_and_jacobian(self.chain, self.coordinates(q, eta))
@@ -84,7 +85,7 @@ class PoseCorrection(eqx.Module):
         rotation_error: remaining rotation [rad], its sine for large ones.
     """
 
-    value: PerJoint
+    value: PerAxis
     reached: Bool[Array, ""]
     position_error: Scalar
     rotation_error: Scalar
@@ -93,7 +94,7 @@ class PoseCorrection(eqx.Module):
 def correct_pose(
     arm: DeformableArm,
     target: Transform,
-    q: PerJoint,
+    q: PerAxis,
     eta: PerElastic,
     *,
     axes: tuple[int, ...] | None = None,
