@@ -212,17 +212,22 @@ def _newton(arm, target, q, eta, length, largest, *, axes, rows, steps):
 def _newton_jvp(primals, tangents, *, axes, rows, steps):
     arm, target, q, eta, length, largest = primals
     arm_t, target_t, q_t, eta_t, *_ = tangents
-    moving = np.array(axes)
-    value = _newton(
-        arm, target, q, eta, length, largest, axes=axes, rows=rows, steps=steps
+    value = _newton(*primals, axes=axes, rows=rows, steps=steps)
+    actual, matrix = arm.tool(value, eta)
+    # what moves the tool with the moving axes at rest, and what moves the target
+    tool_t = jnp.zeros_like(actual)
+    if jax.tree.leaves((arm_t, eta_t)):
+        pose = lambda arm, eta: arm.tool(value, eta)[0]
+        _, tool_t = eqx.filter_jvp(pose, (arm, eta), (arm_t, eta_t))
+    target_t = jnp.zeros_like(target) if target_t is None else target_t
+    _, error_t = jax.jvp(pose_error, (target, actual), (target_t, tool_t))
+    resting = np.isin(np.arange(arm.axes), axes, invert=True).astype(q.dtype)
+    resting_t = jnp.zeros_like(q) if q_t is None else resting * q_t
+    error_t = error_t - matrix @ resting_t
+    weights = row_weights(length, rows)
+    counted, moving = np.array(rows), np.array(axes)
+    change = _solve(
+        weights[:, None] * matrix[counted][:, moving], weights * error_t[counted]
     )
-    # only the resting axes pass the start on
-    resting = jnp.zeros_like(q) if q_t is None else q_t
-    resting = resting.at[moving].set(0.0)
-    matrix, _ = _system(arm, target, value, eta, length, axes, rows)
-    _, error_t = eqx.filter_jvp(
-        lambda *x: _system(*x, length, axes, rows)[1],
-        (arm, target, value, eta),
-        (arm_t, target_t, resting, eta_t),
-    )
-    return value, resting.at[moving].set(_solve(matrix, error_t))
+    # a product, as a scatter has no transpose here
+    return value, resting_t + np.eye(arm.axes, dtype=q.dtype)[:, moving] @ change

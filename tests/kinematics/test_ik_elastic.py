@@ -85,8 +85,6 @@ def test_variants(robot, cases):
     left, (change, start) = compare(arm, wrist, *cases)
     worst = {name: tuple(float(np.max(x)) for x in pair) for name, pair in left.items()}
     mean = {name: tuple(float(np.mean(x)) for x in pair) for name, pair in left.items()}
-    for name, pair in worst.items():
-        print(f"{name}: worst {pair[0]:.2e} m {pair[1]:.2e} rad, mean {mean[name]}")
     # the rigid chain has the same zeros as the axes of the elastic one
     assert np.max(start) < 1e-10
     assert 5e-3 < worst["rigid"][0] < 5e-2
@@ -141,7 +139,8 @@ def test_bending_in_line_with_axis_2_is_taken_back():
     # the same behind axis 3
     eta = jnp.array([0.0, 0.0, -3e-3, 0.0])
     corrected = geometric_correction(arm, q, eta, steepness=1e4)
-    assert_close(corrected, q.at[2].add(3e-3), rtol=0.0, atol=1e-8)
+    # where the tool lies beside the forearm's direction a second order is left
+    assert_close(corrected, q.at[2].add(3e-3), rtol=0.0, atol=0.5 * 3e-3**2)
 
 
 def test_sideways_bending_is_met_by_axis_1():
