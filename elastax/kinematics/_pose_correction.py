@@ -110,8 +110,8 @@ def correct_pose(
     change would exceed the limit, all changes are divided by one common factor, which
     keeps their direction. The text divides each by a factor of its own. With fewer axes
     than rows the weighted error is made as small as it gets: [Reiner2010] 3.6.1 keeps
-    axis 2 or axis 3 at the rigid solution, that is `axes=(0, 2, 3, 4, 5)` or
-    `(0, 1, 3, 4, 5)`.
+    axis 2 or axis 3 at the rigid solution and moves the two other base axes, that is
+    `rows=(0, 1, 2)` with `axes=(0, 2)` or `(0, 1)`.
 
     Near a singular pose the solution that is nearest in angles may be far, or may not
     exist: the steps then stop at the limit and `reached` is false. The value and its

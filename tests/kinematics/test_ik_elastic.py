@@ -60,16 +60,15 @@ def compare(arm, wrist, q, eta):
         target = rigid_pose(arm, q, eta)
         # the exact solution of the rigid kinematics is the start, as in the text
         start = select_branch(*inverse_kinematics(wrist, target), q)
+        position_by = lambda axes: (
+            correct_pose(arm, target, start, eta, axes=axes, rows=(0, 1, 2)).value
+        )
         variants = {
             "rigid": start,
             "one step": correct_pose(arm, target, start, eta, steps=1).value,
             "iterated": correct_pose(arm, target, start, eta).value,
-            "axis 2 kept": correct_pose(
-                arm, target, start, eta, axes=(0, 2, 3, 4, 5)
-            ).value,
-            "axis 3 kept": correct_pose(
-                arm, target, start, eta, axes=(0, 1, 3, 4, 5)
-            ).value,
+            "axis 2 kept": position_by((0, 2)),
+            "axis 3 kept": position_by((0, 1)),
             "geometric": geometric_correction(arm, start, eta),
         }
         return {name: distances(arm, q, eta, x) for name, x in variants.items()}, (
@@ -87,19 +86,20 @@ def test_variants(robot, cases):
     mean = {name: tuple(float(np.mean(x)) for x in pair) for name, pair in left.items()}
     # the rigid chain has the same zeros as the axes of the elastic one
     assert np.max(start) < 1e-10
-    assert 5e-3 < worst["rigid"][0] < 5e-2
+    assert 1e-2 < worst["rigid"][0] < 2e-2 and mean["rigid"][0] > 5e-3
     # [Reiner2010] 3.6.1 iterated: the tool is held to rounding
     assert worst["iterated"][0] < 1e-12 and worst["iterated"][1] < 1e-12
     assert np.max(change) < 0.1
-    # one step leaves the square of the deformation
-    assert worst["one step"][0] < 1e-3 < 1e-1 * worst["rigid"][0] * 10
-    assert mean["one step"][0] < 0.05 * mean["rigid"][0]
-    # with an axis kept one direction of the error stays
+    # one step leaves the square of the deformation, 10 mrad in all at 2.7 m
+    assert worst["one step"][0] < 0.01**2 * 2.7
+    assert worst["one step"][1] < 0.01**2
+    # two base axes instead of three: one direction of the position stays
     for name in ("axis 2 kept", "axis 3 kept"):
-        assert worst["iterated"][0] < mean[name][0] < mean["rigid"][0]
-    # [Reiner2010] 3.6.2: the position is nearly held, the orientation is not
-    assert mean["geometric"][0] < 0.2 * mean["rigid"][0]
-    assert mean["geometric"][1] > 1e-4
+        assert 1e-4 < mean[name][0] < 0.6 * mean["rigid"][0]
+    # [Reiner2010] 3.6.2: a tenth of the position error stays, the orientation all
+    assert mean["geometric"][0] < 0.1 * mean["rigid"][0]
+    assert worst["geometric"][0] < 0.15 * worst["rigid"][0]
+    assert 0.5 < mean["geometric"][1] / mean["rigid"][1] < 2.0
 
 
 def test_no_deformation_no_correction(robot, cases):
