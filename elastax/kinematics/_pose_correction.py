@@ -71,8 +71,8 @@ class DeformableArm(eqx.Module):
         self, q: PerAxis, eta: PerElastic
     ) -> tuple[Transform, Float[Array, "6 axes"]]:
         """Pose of the tool [m] and its geometric Jacobian by the axes [m/rad]."""
-        pose, matrix = _pose_and_jacobian(self.chain, self.coordinates(q, eta))
-        return pose, matrix @ self.coupling[:, : self.axes]
+        stacked = jnp.concatenate([q, eta])
+        return _pose_and_jacobian(self.chain, self.coupling, stacked, self.axes)
 
 
 class PoseCorrection(eqx.Module):
@@ -156,7 +156,8 @@ def correct_pose(
     value = _newton(
         arm, target, q, eta, length, largest, axes=axes, rows=rows, steps=steps
     )
-    error, near = jax.lax.stop_gradient(_remaining(arm, target, value, eta, rows))
+    reported = jax.lax.stop_gradient((arm, target, value, eta))
+    error, near = _remaining(*reported, rows)
     position = root(jnp.sum(error[:3] ** 2), 0.0)
     rotation = root(jnp.sum(error[3:] ** 2), 0.0)
     reached = near & (position <= tolerance) & (rotation <= tolerance)
@@ -164,10 +165,10 @@ def correct_pose(
 
 
 @kernel
-def _pose_and_jacobian(chain: SerialChain, coordinates: PerJoint):
-    frames = moving_frames(chain, coordinates)
+def _pose_and_jacobian(chain: SerialChain, coupling, stacked, axes: int):
+    frames = moving_frames(chain, coupling @ stacked)
     pose = transform(leading(frames.tool_rotation), leading(frames.tool_position))
-    return pose, leading(tool_jacobian(chain, frames))
+    return pose, leading(tool_jacobian(chain, frames)) @ coupling[:, :axes]
 
 
 def _remaining(arm, target, q, eta, rows):
@@ -199,13 +200,15 @@ def _solve(matrix, error):
 @eqx.filter_custom_jvp
 def _newton(arm, target, q, eta, length, largest, *, axes, rows, steps):
     moving = np.array(axes)
-    for _ in range(steps):
+
+    def step(_, q):
         matrix, error = _system(arm, target, q, eta, length, axes, rows)
         change = _solve(matrix, error)
         # [Reiner2010] (3.58) with the largest of the factors c_lim for all
         factor = jnp.maximum(1.0, jnp.max(jnp.abs(change)) / largest)
-        q = q.at[moving].add(change / factor)
-    return q
+        return q.at[moving].add(change / factor)
+
+    return jax.lax.fori_loop(0, steps, step, q)
 
 
 @_newton.def_jvp

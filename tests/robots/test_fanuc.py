@@ -48,7 +48,8 @@ def test_limits_hold_the_named_poses_and_the_maker_sees_them(arm):
         assert_close(arm.to_maker(q), pose, rtol=0.0, atol=1e-15)
     assert_close(np.rad2deg(arm.to_maker(arm.lower)[1]), -76.0, rtol=1e-12)
     assert_close(np.rad2deg(arm.to_maker(arm.upper)[1]), 60.0, rtol=1e-12)
-    assert "assumptions" and len(arm.assumptions) == 3
+    # senses, coupling, limits: what the text does not give
+    assert len(arm.assumptions) == 3
 
 
 def test_tool_down(arm):
