@@ -5,6 +5,7 @@ conventions do not matter. All eight branches are computed at once, as arrays of
 (8,) over shoulder, elbow and wrist.
 """
 
+import math
 from typing import NamedTuple
 
 import equinox as eqx
@@ -15,6 +16,7 @@ from jaxtyping import Array, Bool, Float
 
 from .._checks import is_concrete
 from .._custom_types import Matrix3, Scalar, Transform, Vector3
+from .._kernel import kernel
 from .._taylor import leading
 from ._chain import SerialChain, moving_frames
 from ._joints import JointKind
@@ -84,6 +86,13 @@ class Geometry(NamedTuple):
     wrist_zero: Scalar
     tool_to_wrist: Matrix3
     tool_offset: Vector3
+
+
+# of the fields of `Geometry`, of a pose, of joint angles
+_SHAPES = (
+    *((3,), (3, 3), (3, 3), (2,), (2,), (2,), (2,), (), (3, 3), (), (3, 3), (3,)),
+    *((4, 4), (6,)),
+)
 
 
 def inverse_kinematics(
@@ -227,7 +236,30 @@ def _solve(
     previous: Float[Array, "6"],
     weights: WristWeights | None,
 ):
-    """Branches of `inverse_kinematics`; b, e, w are the signs of [KinModell] 3.3."""
+    """Branches of `inverse_kinematics`, and which reach the pose."""
+    parts = (*g, pose, previous)
+    shares = () if weights is None else (weights.shares(jnp.ones((), pose.dtype))[0],)
+    # one operand: its tangent is never a constant, which XLA can fail to hand over
+    vector = jnp.concatenate([jnp.ravel(part) for part in (*parts, *shares)])
+    solutions, margins = _branches(vector)
+    return solutions, jnp.all(margins >= 0, axis=1)
+
+
+def _unpacked(vector):
+    """Geometry, pose, previous angles and, if there is one, the share of axis 4."""
+    ends = np.cumsum([math.prod(shape) for shape in _SHAPES]).tolist()
+    parts = [
+        jnp.reshape(vector[end - math.prod(shape) : end], shape)
+        for end, shape in zip(ends, _SHAPES)
+    ]
+    share = vector[ends[-1]] if vector.shape[0] > ends[-1] else None
+    return Geometry(*parts[:-2]), *parts[-2:], share
+
+
+@kernel
+def _branches(vector):
+    """Angles and margins of reach; b, e, w are the signs of [KinModell] 3.3."""
+    g, pose, previous, share = _unpacked(vector)
     b, e, w = (jnp.asarray(s, pose.dtype) for s in (_SHOULDER, _ELBOW, _WRIST))
     upper, fore = length(g.upper), length(g.fore)
     # lengths are distinguished from zero down to rounding
@@ -277,22 +309,20 @@ def _solve(
     half = jnp.where(w > 0, 0.0, np.pi)
     sine, cosine = w * r[:, 1, 2], w * r[:, 0, 2]
     q4 = angle(sine, cosine, previous[3] + half, rounding**2)
-    if weights is not None:
+    if share is not None:
         # [Berns], singular configuration: what axis 6 would turn alone is shared
-        change = wrapped(_roll(r, q4) - previous[5] - half)
-        share, _ = weights.shares(change)
+        change = share * wrapped(_roll(r, q4) - previous[5] - half)
         aligned = sine**2 + cosine**2 <= rounding**2
         # theta_4 + theta_6 is fixed, or the difference with axis 5 half a turn away
-        share = jnp.where(r[:, 2, 2] < 0, -share, share)
-        q4 = q4 + jnp.where(aligned, share, 0.0)
+        change = jnp.where(r[:, 2, 2] < 0, -change, change)
+        q4 = q4 + jnp.where(aligned, change, 0.0)
     sine, cosine = jnp.sin(q4), jnp.cos(q4)
     bend = jnp.arctan2(cosine * r[:, 0, 2] + sine * r[:, 1, 2], r[:, 2, 2])
     q6 = _roll(r, q4)
 
     solutions = jnp.stack([q1, q2, q3, q4, bend - g.wrist_zero, q6], axis=1)
-    slack = -rounding * scale
-    valid = (radial >= slack) & (outer >= slack) & (inner >= slack)
-    return wrapped(solutions), valid
+    margins = jnp.stack([jnp.broadcast_to(radial, b.shape), outer, inner], axis=1)
+    return wrapped(solutions), margins + rounding * scale
 
 
 def _roll(r: Float[Array, "8 3 3"], q4: Float[Array, "8"]) -> Float[Array, "8"]:

@@ -71,8 +71,7 @@ class DeformableArm(eqx.Module):
         self, q: PerAxis, eta: PerElastic
     ) -> tuple[Transform, Float[Array, "6 axes"]]:
         """Pose of the tool [m] and its geometric Jacobian by the axes [m/rad]."""
-        stacked = jnp.concatenate([q, eta])
-        return _pose_and_jacobian(self.chain, self.coupling, stacked, self.axes)
+        return _tool(self, q, eta if eta.size else None)
 
 
 class PoseCorrection(eqx.Module):
@@ -153,8 +152,9 @@ def correct_pose(
         raise ValueError(f"`steps` must not be negative, but is {steps}")
     length = jnp.asarray(characteristic_length, q.dtype)
     largest = jnp.asarray(largest_step, q.dtype)
+    some = eta if eta.size else None
     value = _newton(
-        arm, target, q, eta, length, largest, axes=axes, rows=rows, steps=steps
+        arm, target, q, some, length, largest, axes=axes, rows=rows, steps=steps
     )
     reported = jax.lax.stop_gradient((arm, target, value, eta))
     error, near = _remaining(*reported, rows)
@@ -165,10 +165,12 @@ def correct_pose(
 
 
 @kernel
-def _pose_and_jacobian(chain: SerialChain, coupling, stacked, axes: int):
-    frames = moving_frames(chain, coupling @ stacked)
+def _tool(arm: DeformableArm, q: PerAxis, eta: PerElastic | None):
+    stacked = q if eta is None else jnp.concatenate([q, eta])
+    frames = moving_frames(arm.chain, arm.coupling @ stacked)
     pose = transform(leading(frames.tool_rotation), leading(frames.tool_position))
-    return pose, leading(tool_jacobian(chain, frames)) @ coupling[:, :axes]
+    matrix = leading(tool_jacobian(arm.chain, frames))
+    return pose, matrix @ arm.coupling[:, : arm.axes]
 
 
 def _remaining(arm, target, q, eta, rows):
@@ -181,14 +183,6 @@ def _remaining(arm, target, q, eta, rows):
     return error, near if set(rows) >= {3, 4, 5} else jnp.array(True)
 
 
-def _system(arm, target, q, eta, length, axes, rows):
-    """Weighted Jacobian and error."""
-    actual, matrix = arm.tool(q, eta)
-    weights = row_weights(length, rows)
-    error = weights * pose_error(target, actual)[np.array(rows)]
-    return weights[:, None] * matrix[np.array(rows)][:, np.array(axes)], error
-
-
 def _solve(matrix, error):
     """Least squares with a damping that only a singular matrix feels."""
     size = jnp.sqrt(jnp.sum(matrix**2))
@@ -197,16 +191,28 @@ def _solve(matrix, error):
     return leading(damped_least_squares(matrix, error, 10 * rounding * size))
 
 
+def _selection(indices: tuple[int, ...], number: int, dtype) -> np.ndarray:
+    """Rows of the identity: products with it are read by index in a kernel."""
+    return np.eye(number, dtype=dtype)[list(indices)]
+
+
+@kernel
+def _step(arm, target, q, eta, length, largest, axes, rows):
+    """One correction, (3.57) and (3.58)."""
+    actual, matrix = _tool(arm, q, eta)
+    counted = row_weights(length)[:, None] * _selection(rows, 6, q.dtype).T
+    moving = _selection(axes, arm.axes, q.dtype)
+    error = counted.T @ pose_error(target, actual)
+    change = _solve(counted.T @ matrix @ moving.T, error)
+    # [Reiner2010] (3.58) with the largest of the factors c_lim for all
+    factor = jnp.maximum(1.0, jnp.max(jnp.abs(change)) / largest)
+    return q + moving.T @ (change / factor)
+
+
 @eqx.filter_custom_jvp
 def _newton(arm, target, q, eta, length, largest, *, axes, rows, steps):
-    moving = np.array(axes)
-
     def step(_, q):
-        matrix, error = _system(arm, target, q, eta, length, axes, rows)
-        change = _solve(matrix, error)
-        # [Reiner2010] (3.58) with the largest of the factors c_lim for all
-        factor = jnp.maximum(1.0, jnp.max(jnp.abs(change)) / largest)
-        return q.at[moving].add(change / factor)
+        return _step(arm, target, q, eta, length, largest, axes, rows)
 
     return jax.lax.fori_loop(0, steps, step, q)
 
@@ -216,21 +222,18 @@ def _newton_jvp(primals, tangents, *, axes, rows, steps):
     arm, target, q, eta, length, largest = primals
     arm_t, target_t, q_t, eta_t, *_ = tangents
     value = _newton(*primals, axes=axes, rows=rows, steps=steps)
-    actual, matrix = arm.tool(value, eta)
+    actual, matrix = _tool(arm, value, eta)
     # what moves the tool with the moving axes at rest, and what moves the target
     tool_t = jnp.zeros_like(actual)
     if jax.tree.leaves((arm_t, eta_t)):
-        pose = lambda arm, eta: arm.tool(value, eta)[0]
+        pose = lambda arm, eta: _tool(arm, value, eta)[0]
         _, tool_t = eqx.filter_jvp(pose, (arm, eta), (arm_t, eta_t))
     target_t = jnp.zeros_like(target) if target_t is None else target_t
     _, error_t = jax.jvp(pose_error, (target, actual), (target_t, tool_t))
     resting = np.isin(np.arange(arm.axes), axes, invert=True).astype(q.dtype)
     resting_t = jnp.zeros_like(q) if q_t is None else resting * q_t
     error_t = error_t - matrix @ resting_t
-    weights = row_weights(length, rows)
-    counted, moving = np.array(rows), np.array(axes)
-    change = _solve(
-        weights[:, None] * matrix[counted][:, moving], weights * error_t[counted]
-    )
-    # a product, as a scatter has no transpose here
-    return value, resting_t + np.eye(arm.axes, dtype=q.dtype)[:, moving] @ change
+    counted = row_weights(length)[:, None] * _selection(rows, 6, q.dtype).T
+    moving = _selection(axes, arm.axes, q.dtype)
+    change = _solve(counted.T @ matrix @ moving.T, counted.T @ error_t)
+    return value, resting_t + moving.T @ change
