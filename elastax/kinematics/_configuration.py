@@ -28,17 +28,19 @@ class KukaConfiguration(eqx.Module):
     through the axes 2 and 3, in its positive sense. Bit 2: axis 5 is negative. Bit k of
     Turn: axis k + 1 is negative.
 
-    Sources: the manuals of two controllers that take KUKA's flags over. Siemens,
-    SINUMERIK ONE, NC programming, 12/2019, p. 710 (address STAT); Beckhoff, TF5200
-    programming manual, "Status & Turn (IS, IT)". What is ambiguous: an axis at exactly
-    zero counts as positive here, while a controller reads the sign of its encoder's
-    rounding; users report KUKA manuals that print the conditions of bit 2 the other
-    way round; bits 3 and 4 of newer controllers are left at zero; and Turn tells apart
-    one turn to each side only, not the turns of an endless axis.
+    What is ambiguous: an axis at exactly zero counts as positive here, while a
+    controller reads the sign of its encoder's rounding; users report that KUKA's own
+    manuals describe bit 2 unclearly; bits 3 and 4 of newer controllers are left at
+    zero; and Turn tells apart one turn to each side only, not the turns of an endless
+    axis.
 
     Attributes:
         status: 0 to 7.
         turn: 0 to 63.
+
+    References:
+        The manuals of two controllers that take KUKA's flags over: [Siemens2019],
+        p. 710, address STAT; [BeckhoffTF5200], "Status & Turn (IS, IT)".
     """
 
     status: Int[Array, ""] = eqx.field(converter=jnp.asarray)

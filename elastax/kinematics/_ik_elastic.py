@@ -9,11 +9,12 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from .._custom_types import PerElastic, Scalar, Vector3
+from .._kernel import kernel
 from .._taylor import leading
 from ._chain import moving_frames
 from ._damping import attenuate
 from ._pose_correction import DeformableArm, PerAxis
-from ._safe_angles import root
+from ._safe_angles import angle, root
 
 
 class _Points(NamedTuple):
@@ -63,8 +64,13 @@ def geometric_correction(
     """
     if arm.axes < 5:
         raise ValueError(f"`arm` must have an arm and a wrist, but has {arm.axes} axes")
-    steepness = jnp.asarray(steepness, q.dtype)
-    rigid = _points(arm, q, jnp.zeros_like(eta))
+    some = eta if eta.size else None
+    return _corrected(arm, q, some, jnp.asarray(steepness, q.dtype))
+
+
+@kernel
+def _corrected(arm: DeformableArm, q: PerAxis, eta, steepness: Scalar):
+    rigid = _points(arm, q, None if eta is None else jnp.zeros_like(eta))
 
     # the structure behind an axis, as it lies in the frame of the undeformed arm
     along = {
@@ -81,10 +87,10 @@ def geometric_correction(
         x = x / root(x @ x, 0.0)
         lever = x @ (actual - points.origin[axis])
         deviation = jnp.cross(z, x) @ (target - actual)
-        # a safe operand where the lever vanishes and the correction with it
-        some = jnp.abs(lever) > 1e3 * float(jnp.finfo(lever.dtype).tiny)
-        angle = jnp.arctan(deviation / jnp.where(some, lever, 1.0))
-        return jnp.where(some, attenuate(angle, lever, steepness), 0.0)
+        # the arctangent of the quotient, without dividing by the lever
+        sign = jnp.where(lever < 0, -1.0, 1.0)
+        correction = angle(sign * deviation, sign * lever, jnp.zeros_like(lever), 0.0)
+        return attenuate(correction, lever, steepness)
 
     points = _points(arm, q, eta)
     q = q.at[1].add(turn(1, points, points.origin[2], rigid.origin[2]))
@@ -94,8 +100,9 @@ def geometric_correction(
     return q.at[2].add(third).at[0].add(first)
 
 
-def _points(arm: DeformableArm, q: PerAxis, eta: PerElastic) -> _Points:
-    frames = moving_frames(arm.chain, arm.coordinates(q, eta))
+def _points(arm: DeformableArm, q: PerAxis, eta: PerElastic | None) -> _Points:
+    stacked = q if eta is None else jnp.concatenate([q, eta])
+    frames = moving_frames(arm.chain, arm.coupling @ stacked)
     pick = lambda x: tuple(leading(x)[k] for k in arm.axis_joints)
     return _Points(
         pick(frames.rotation),
