@@ -11,7 +11,7 @@ from .._checks import check_fields, check_values
 from .._custom_types import PerElastic, PerJoint, Transform, Vector3, as_real
 from .._taylor import concatenate, product
 from ..drivetrain import AbstractCounterbalance, DriveTrain
-from ..kinematics import SerialChain
+from ..kinematics import Arm, DeformableArm, SerialChain
 from ..structure import AbstractStiffness
 from ._bodies import RigidBodies
 from ._reduce import locked_chain
@@ -203,6 +203,35 @@ class ElasticRobot(eqx.Module):
     def rigid(self) -> "ElasticRobot":
         """The same robot with rigid gears and a rigid structure."""
         return _without_structure(self, self.drives.rigid())
+
+    def arm(self) -> Arm:
+        """The kinematics of the rigid robot, limits in the chain's own angles."""
+        limits = self.limits
+        # an axis that the maker counts backwards swaps its limits
+        ends = jnp.stack([self.from_maker(limits.lower), self.from_maker(limits.upper)])
+        return Arm(
+            chain=self.rigid().chain,
+            lower=jnp.min(ends, axis=0),
+            upper=jnp.max(ends, axis=0),
+            velocity=limits.velocity,
+            signs=self.axis_signs,
+            zeros=self.axis_zeros,
+            poses=self.poses,
+            name=self.name,
+            axis_names=self.axis_names,
+            sources=self.sources,
+            assumptions=self.assumptions,
+        )
+
+    def deformable_arm(self) -> DeformableArm:
+        """The chain with its elastic joints, for the inverse of the deformed arm."""
+        joints = {
+            role.index: joint
+            for joint, role in enumerate(self.roles)
+            if isinstance(role, AxisRole)
+        }
+        axis_joints = tuple(joints[k] for k in range(self.axes))
+        return DeformableArm(self.chain, self.coupling(), axis_joints)
 
     def with_payload(self, mass, com, inertia) -> "ElasticRobot":
         """The same robot with another payload.

@@ -9,6 +9,14 @@ from ._chain import (
     link_poses as link_poses,
     moving_frames as moving_frames,
 )
+from ._configuration import (
+    FanucConfiguration as FanucConfiguration,
+    KukaConfiguration as KukaConfiguration,
+    fanuc_configuration as fanuc_configuration,
+    fanuc_joint_angles as fanuc_joint_angles,
+    kuka_configuration as kuka_configuration,
+    kuka_joint_angles as kuka_joint_angles,
+)
 from ._damping import (
     AbstractDamping as AbstractDamping,
     ConstantDamping as ConstantDamping,
@@ -31,6 +39,9 @@ from ._ik_analytic import (
     inverse_kinematics_path as inverse_kinematics_path,
     select_branch as select_branch,
 )
+from ._ik_calibrated import (
+    calibrated_inverse_kinematics as calibrated_inverse_kinematics,
+)
 from ._ik_dls import (
     PoseResults as PoseResults,
     PoseSolution as PoseSolution,
@@ -40,12 +51,18 @@ from ._ik_dls import (
     smallest_singular_value as smallest_singular_value,
     solve_damped as solve_damped,
 )
+from ._ik_elastic import geometric_correction as geometric_correction
 from ._ik_evaluate import pose_difference as pose_difference
 from ._ik_minimise import minimise_pose as minimise_pose
 from ._ik_numeric import (
     NumericSolution as NumericSolution,
     singular_distance as singular_distance,
     solve_pose as solve_pose,
+)
+from ._ik_planar import (
+    PlanarArm as PlanarArm,
+    planar_inverse as planar_inverse,
+    planar_inverse_geometric as planar_inverse_geometric,
 )
 from ._ik_restarts import (
     FoundPose as FoundPose,
@@ -88,6 +105,16 @@ from ._parameters import (
     Parameter as Parameter,
     parameter_jacobian as parameter_jacobian,
 )
+from ._pose_correction import (
+    DeformableArm as DeformableArm,
+    PoseCorrection as PoseCorrection,
+    correct_pose as correct_pose,
+)
+from ._posture import (
+    Posture as Posture,
+    branch_index as branch_index,
+    posture_of as posture_of,
+)
 from ._redundancy import (
     hard_and_soft as hard_and_soft,
     weighted_correction as weighted_correction,
@@ -102,6 +129,14 @@ from ._se3 import (
     rotation_z as rotation_z,
     transform as transform,
 )
+from ._separation import (
+    MatrixEquation as MatrixEquation,
+    contained_unknowns as contained_unknowns,
+    inverse_by_separation as inverse_by_separation,
+    link_transforms as link_transforms,
+    separated_equation as separated_equation,
+    separated_equations as separated_equations,
+)
 from ._structured import (
     SAME as SAME,
     JointStructure as JointStructure,
@@ -111,3 +146,4 @@ from ._structured import (
     placements as placements,
     structured as structured,
 )
+from ._wrist_weights import WristWeights as WristWeights

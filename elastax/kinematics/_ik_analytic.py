@@ -5,6 +5,7 @@ conventions do not matter. All eight branches are computed at once, as arrays of
 (8,) over shoulder, elbow and wrist.
 """
 
+import math
 from typing import NamedTuple
 
 import equinox as eqx
@@ -15,10 +16,13 @@ from jaxtyping import Array, Bool, Float
 
 from .._checks import is_concrete
 from .._custom_types import Matrix3, Scalar, Transform, Vector3
+from .._kernel import kernel
 from .._taylor import leading
 from ._chain import SerialChain, moving_frames
 from ._joints import JointKind
+from ._safe_angles import angle, length, root, wrapped
 from ._se3 import rotation_about
+from ._wrist_weights import WristWeights
 
 
 # (shoulder, elbow, wrist), the first index slowest, "+" in front of "-"
@@ -63,7 +67,7 @@ class SphericalWrist(eqx.Module):
         return SphericalWrist(chain)
 
 
-class _Geometry(NamedTuple):
+class Geometry(NamedTuple):
     """The arm at q = 0, in coordinates (x forward, y along +-axis 2, z along axis 1).
 
     `signs` are the senses of axes 2 and 3 about y; `shoulder`, `upper` and `fore` are
@@ -84,10 +88,19 @@ class _Geometry(NamedTuple):
     tool_offset: Vector3
 
 
+# of the fields of `Geometry`, of a pose, of joint angles
+_SHAPES = (
+    *((3,), (3, 3), (3, 3), (2,), (2,), (2,), (2,), (), (3, 3), (), (3, 3), (3,)),
+    *((4, 4), (6,)),
+)
+
+
 def inverse_kinematics(
     arm: SphericalWrist,
     pose: Transform,
     previous: Float[Array, "6"] | None = None,
+    *,
+    wrist_weights: WristWeights | None = None,
 ) -> tuple[Float[Array, "8 6"], Bool[Array, "8"]]:
     r"""All joint angles at which the tool has the given pose, joint limits aside.
 
@@ -107,17 +120,20 @@ def inverse_kinematics(
             the wrist centre on it, axis 4 with the axes 4 and 6 aligned (the branches
             "-" keep them half a turn away), axis 2 with the wrist centre on it. Zero
             unless given.
+        wrist_weights: how the axes 4 and 6 share their turn where they are aligned;
+            axis 4 rests and axis 6 takes it all unless given.
 
     Returns:
         Angles in (-pi, pi] [rad], shape (8, 6), and which rows reach the pose, shape
         (8,). Rows out of reach are finite: the arm stretched or folded towards it.
 
     References:
-        [Reiner2010] (3.52), (3.53); [KinModell] (3-84) to (3-97).
+        [Reiner2010] (3.52), (3.53); [KinModell] (3-84) to (3-97); [Berns], singular
+        configuration, for the weights.
     """
     if previous is None:
         previous = jnp.zeros((6,), pose.dtype)
-    return _solve(_read_geometry(arm.chain), pose, previous)
+    return _solve(read_geometry(arm.chain), pose, previous, wrist_weights)
 
 
 def select_branch(
@@ -144,26 +160,34 @@ def select_branch(
 
 
 def inverse_kinematics_path(
-    arm: SphericalWrist, poses: Float[Array, "times 4 4"], start: Float[Array, "6"]
+    arm: SphericalWrist,
+    poses: Float[Array, "times 4 4"],
+    start: Float[Array, "6"],
+    *,
+    wrist_weights: WristWeights | None = None,
 ) -> tuple[Float[Array, "times 6"], Bool[Array, " times"]]:
     """Joint angles along a path of the tool, each nearest to the last reached ones.
 
     A path that leaves the workspace returns with the same elbow. Where a sample
-    stretches the arm exactly, the two elbows meet and either may follow.
+    stretches the arm exactly, the two elbows meet and either may follow. Where a sample
+    aligns the axes 4 and 6, only their sum or difference is determined: the weights
+    share the step between them. A path that leaves the aligned wrist sideways asks for
+    a finite turn of axis 4 at once, whatever they are.
 
     Args:
         arm: the arm.
         poses: poses of the tool in the base frame, shape (times, 4, 4) [m].
         start: angles near those of the first pose [rad], shape (6,).
+        wrist_weights: as for `inverse_kinematics`.
 
     Returns:
         Angles without jumps by a turn [rad], shape (times, 6), and which samples are
         reached, shape (times,).
     """
-    geometry = _read_geometry(arm.chain)
+    geometry = read_geometry(arm.chain)
 
     def step(previous, pose):
-        solutions, valid = _solve(geometry, pose, previous)
+        solutions, valid = _solve(geometry, pose, previous, wrist_weights)
         q, reached = select_branch(solutions, valid, previous), jnp.any(valid)
         # out of reach both elbows coincide: only reached angles tell them apart
         return jnp.where(reached, q, previous), (q, reached)
@@ -171,7 +195,8 @@ def inverse_kinematics_path(
     return jax.lax.scan(step, start, poses)[1]
 
 
-def _read_geometry(chain: SerialChain) -> _Geometry:
+def read_geometry(chain: SerialChain) -> Geometry:
+    """Lengths, senses and zeros of an arm with a spherical wrist, read at q = 0."""
     frames = moving_frames(chain, jnp.zeros((6,), chain.base.dtype))
     a, p = leading(frames.axis), leading(frames.position)
     centre = p[3] + a[3] * (a[3] @ (p[4] - p[3]))
@@ -179,7 +204,7 @@ def _read_geometry(chain: SerialChain) -> _Geometry:
 
     # forward is where the wrist is at q = 0, or else where axis 2 is
     reach, offset = outward @ (centre - p[0]), outward @ (p[1] - p[0])
-    small = 1e-6 * _norm(centre - p[1])
+    small = 1e-6 * length(centre - p[1])
     side = jnp.where(jnp.abs(reach) > small, reach, offset)
     side = jnp.where(jnp.abs(side) > small, side, 1.0)
     sign = jnp.where(side < 0, -1.0, 1.0)
@@ -189,7 +214,7 @@ def _read_geometry(chain: SerialChain) -> _Geometry:
     wrist_axes = jnp.stack([jnp.cross(a[4], a[3]), a[4], a[3]])
     zero = jnp.arctan2(wrist_axes[0] @ a[5], wrist_axes[2] @ a[5])
     rotation = leading(frames.tool_rotation).T
-    return _Geometry(
+    return Geometry(
         origin=p[0],
         axes=a[:3],
         arm=arm,
@@ -205,10 +230,38 @@ def _read_geometry(chain: SerialChain) -> _Geometry:
     )
 
 
-def _solve(g: _Geometry, pose: Transform, previous: Float[Array, "6"]):
-    """Branches of `inverse_kinematics`; b, e, w are the signs of [KinModell] 3.3."""
+def _solve(
+    g: Geometry,
+    pose: Transform,
+    previous: Float[Array, "6"],
+    weights: WristWeights | None,
+):
+    """Branches of `inverse_kinematics`, and which reach the pose."""
+    parts = (*g, pose, previous)
+    shares = () if weights is None else (weights.shares(jnp.ones((), pose.dtype))[0],)
+    # one operand: its tangent is never a constant, which XLA can fail to hand over
+    vector = jnp.concatenate([jnp.ravel(part) for part in (*parts, *shares)])
+    solutions, margins = _branches(vector)
+    return solutions, jnp.all(margins >= 0, axis=1)
+
+
+def _unpacked(vector):
+    """Geometry, pose, previous angles and, if there is one, the share of axis 4."""
+    ends = np.cumsum([math.prod(shape) for shape in _SHAPES]).tolist()
+    parts = [
+        jnp.reshape(vector[end - math.prod(shape) : end], shape)
+        for end, shape in zip(ends, _SHAPES)
+    ]
+    share = vector[ends[-1]] if vector.shape[0] > ends[-1] else None
+    return Geometry(*parts[:-2]), *parts[-2:], share
+
+
+@kernel
+def _branches(vector):
+    """Angles and margins of reach; b, e, w are the signs of [KinModell] 3.3."""
+    g, pose, previous, share = _unpacked(vector)
     b, e, w = (jnp.asarray(s, pose.dtype) for s in (_SHOULDER, _ELBOW, _WRIST))
-    upper, fore = _norm(g.upper), _norm(g.fore)
+    upper, fore = length(g.upper), length(g.fore)
     # lengths are distinguished from zero down to rounding
     rounding = 1e5 * float(jnp.finfo(pose.dtype).eps)
     scale = (upper + fore) ** 2
@@ -219,9 +272,9 @@ def _solve(g: _Geometry, pose: Transform, previous: Float[Array, "6"]):
 
     # axis 1, [Reiner2010] (3.53b, d)
     radial = x**2 + y**2 - g.lateral**2
-    u = _sqrt(radial, rounding**2 * scale)
-    tilt = _angle(g.lateral, u, jnp.zeros_like(u), rounding**2 * scale)
-    azimuth = _angle(y, x, previous[0], rounding**2 * scale)
+    u = root(radial, rounding**2 * scale)
+    tilt = angle(g.lateral, u, jnp.zeros_like(u), rounding**2 * scale)
+    azimuth = angle(y, x, previous[0], rounding**2 * scale)
     q1 = azimuth - jnp.where(b > 0, tilt, np.pi - tilt)
 
     # axis 3, [Reiner2010] (3.53c, f), with products instead of 1 - D^2
@@ -229,7 +282,7 @@ def _solve(g: _Geometry, pose: Transform, previous: Float[Array, "6"]):
     square = reach_x**2 + reach_z**2
     outer, inner = (upper + fore) ** 2 - square, square - (upper - fore) ** 2
     fold = jnp.arctan2(
-        _sqrt(outer * inner, (rounding * scale) ** 2), square - upper**2 - fore**2
+        root(outer * inner, (rounding * scale) ** 2), square - upper**2 - fore**2
     )
     stretched = jnp.arctan2(
         g.upper[0] * g.fore[1] - g.upper[1] * g.fore[0], g.upper @ g.fore
@@ -240,7 +293,7 @@ def _solve(g: _Geometry, pose: Transform, previous: Float[Array, "6"]):
     sine, cosine = jnp.sin(g.signs[1] * q3), jnp.cos(g.signs[1] * q3)
     knee_x = g.upper[0] + cosine * g.fore[0] + sine * g.fore[1]
     knee_z = g.upper[1] + cosine * g.fore[1] - sine * g.fore[0]
-    q2 = g.signs[0] * _angle(
+    q2 = g.signs[0] * angle(
         reach_x * knee_z - reach_z * knee_x,
         reach_x * knee_x + reach_z * knee_z,
         g.signs[0] * previous[1],
@@ -253,42 +306,31 @@ def _solve(g: _Geometry, pose: Transform, previous: Float[Array, "6"]):
     r = jnp.einsum(
         "ij,njk,kl->nil", g.wrist, jnp.swapaxes(turned, 1, 2), target @ g.tool_to_wrist
     )
-    kept = previous[3] + jnp.where(w > 0, 0.0, np.pi)
-    q4 = _angle(w * r[:, 1, 2], w * r[:, 0, 2], kept, rounding**2)
+    half = jnp.where(w > 0, 0.0, np.pi)
+    sine, cosine = w * r[:, 1, 2], w * r[:, 0, 2]
+    q4 = angle(sine, cosine, previous[3] + half, rounding**2)
+    if share is not None:
+        # [Berns], singular configuration: what axis 6 would turn alone is shared
+        change = share * wrapped(_roll(r, q4) - previous[5] - half)
+        aligned = sine**2 + cosine**2 <= rounding**2
+        # theta_4 + theta_6 is fixed, or the difference with axis 5 half a turn away
+        change = jnp.where(r[:, 2, 2] < 0, -change, change)
+        q4 = q4 + jnp.where(aligned, change, 0.0)
     sine, cosine = jnp.sin(q4), jnp.cos(q4)
     bend = jnp.arctan2(cosine * r[:, 0, 2] + sine * r[:, 1, 2], r[:, 2, 2])
-    q6 = jnp.arctan2(
-        cosine * r[:, 1, 0] - sine * r[:, 0, 0], cosine * r[:, 1, 1] - sine * r[:, 0, 1]
-    )
+    q6 = _roll(r, q4)
 
     solutions = jnp.stack([q1, q2, q3, q4, bend - g.wrist_zero, q6], axis=1)
-    slack = -rounding * scale
-    valid = (radial >= slack) & (outer >= slack) & (inner >= slack)
-    return _wrap(solutions), valid
+    margins = jnp.stack([jnp.broadcast_to(radial, b.shape), outer, inner], axis=1)
+    return wrapped(solutions), margins + rounding * scale
 
 
-def _norm(vector):
-    return jnp.sqrt(jnp.sum(vector**2))
-
-
-def _sqrt(x, threshold):
-    """Square root, zero with zero slope up to `threshold`."""
-    positive = x > threshold
-    # a safe operand where the branch is not taken: the slope would be infinite
-    return jnp.where(positive, jnp.sqrt(jnp.where(positive, x, 1.0)), 0.0)
-
-
-def _angle(y, x, kept, threshold):
-    """`arctan2(y, x)`, or `kept` where the squared length is within `threshold`."""
-    free = x**2 + y**2 <= threshold
-    return jnp.where(
-        free, kept, jnp.arctan2(jnp.where(free, 0.0, y), jnp.where(free, 1.0, x))
+def _roll(r: Float[Array, "8 3 3"], q4: Float[Array, "8"]) -> Float[Array, "8"]:
+    """Angle of axis 6 that goes with the one of axis 4, from R = Rz(4) Ry(5) Rz(6)."""
+    sine, cosine = jnp.sin(q4), jnp.cos(q4)
+    return jnp.arctan2(
+        cosine * r[:, 1, 0] - sine * r[:, 0, 0], cosine * r[:, 1, 1] - sine * r[:, 0, 1]
     )
-
-
-def _wrap(angle):
-    """Angle in (-pi, pi]."""
-    return angle - 2 * np.pi * jnp.ceil((angle - np.pi) / (2 * np.pi))
 
 
 def _check_geometry(chain: SerialChain, tolerance: float = 1e-6) -> None:

@@ -1,5 +1,6 @@
 """Robots: functions that return records, every number with its source."""
 
+from ._fanuc import fanuc as fanuc
 from ._iiwa14 import iiwa14 as iiwa14
 from ._kr16 import kr16 as kr16
 from ._kr210 import kr210 as kr210
@@ -11,4 +12,5 @@ from ._named import (
     named_model as named_model,
     named_robot as named_robot,
 )
+from ._planar_2r import planar_2r as planar_2r
 from ._ur10e import ur10e as ur10e
