@@ -98,6 +98,8 @@ class Walk:
         lengths = self.size * _ROUNDED
         small = (_ROUNDED, lengths, lengths, _ROUNDED, _ROUNDED)
         row = Row(*(0.0 if abs(x) <= s else float(x) for x, s in zip(row, small)))
+        if row.theta < _ROUNDED - np.pi:
+            row = row._replace(theta=np.pi)
         self.rows.append(row)
         self.frame = self.frame @ row.matrix()
 
@@ -183,8 +185,9 @@ def _pierced(walk: Walk, line: Line, k: int, determined: bool) -> np.ndarray:
         return np.zeros(2)
     if slope <= _ROUNDING or abs(point[2]) / slope > _FARTHEST * walk.size:
         raise ValueError(
-            f"{what}must not be perpendicular, but are, so that axis {k + 2} does not "
-            "pierce the x-y plane of the frame in front in one point; use `to_mixed`"
+            f"{what}must not be perpendicular, but are by {slope:.2g} rad, so that "
+            f"axis {k + 2} does not pierce the x-y plane of the frame in front in one "
+            "point within reach; use `to_mixed`"
         )
     return (point - z * (point[2] / z[2]))[:2]
 
