@@ -170,7 +170,8 @@ def parameter_jacobian(
     turns = jnp.einsum("kijp,klj->kilp", slopes[:, :3, :3], factors[:, :3, :3])
     turn = jnp.stack([turns[:, 2, 1], turns[:, 0, 2], turns[:, 1, 0]], axis=1)
     # from the origin of the moved frame to the tool, in the frame in front
-    lever = jnp.einsum("kba,kb->ka", rotation, tool - origin) - factors[:, :3, 3]
+    ahead = jnp.einsum("kba,kb->ka", rotation, tool[None] - origin)
+    lever = ahead - factors[:, :3, 3]
     shift = slopes[:, :3, 3] + jnp.cross(turn, lever[..., None], axis=1)
     columns = [jnp.einsum("kab,kbp->ap", rotation, move) for move in (shift, turn)]
     return jnp.concatenate(columns)

@@ -63,7 +63,14 @@ def seven_axes() -> SerialChain:
 def gantry() -> SerialChain:
     """Slides along x, y and z that carry a wrist of three hinges."""
     identities = np.tile(np.eye(3), (6, 1, 1))
-    position = [[0, 0, 2], [0.1, 0, 0], [0, 0.2, 0], [0, 0, -0.5], [0, 0, -0.1], [0] * 3]
+    position = [
+        [0, 0, 2],
+        [0.1, 0, 0],
+        [0, 0.2, 0],
+        [0, 0, -0.5],
+        [0, 0, -0.1],
+        [0] * 3,
+    ]
     axis = [[1, 0, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1], [0, 1, 0], [0, 0, 1]]
     tool = transform(jnp.eye(3), jnp.array([0.05, 0.0, -0.2]))
     return SerialChain.from_frames(
