@@ -88,8 +88,9 @@ def minimal_model(
         poses: joint coordinates that tell the parameters apart [rad] or [m]; random
             ones of all directions unless given.
         tolerance: a parameter is excluded if no more than this share of its effect is
-            not that of others. Nearly parallel axes with Denavit-Hartenberg joints are
-            converted if it is larger than their angle [rad].
+            not that of others. With Denavit-Hartenberg joints the share is about the
+            square of the angle between nearly parallel axes [rad]: those below a
+            milliradian are converted unless it is changed.
 
     Raises:
         ValueError: parameters of `keep` do not exist or depend on each other, or the
@@ -111,7 +112,7 @@ def minimal_model(
         kept = _select(matrix, _places(everything, keep), tolerance)
         if len(kept) == count:
             break
-        conversion = conversion or _why(chain)
+        conversion = conversion or _why(chain, tolerance)
     else:
         raise ValueError(
             f"`poses` must tell {count} parameters apart, but these {len(poses)} tell "
@@ -185,7 +186,8 @@ def _conventions(chain: SerialChain) -> str:
     return " + ".join(name.removesuffix("Joints") for name in names)
 
 
-def _why(chain: SerialChain) -> str:
-    joints = [j.joint for j in convention_properties(chain).joints if not j.is_complete]
-    which = ", ".join(map(str, joints))
-    return f"{_conventions(chain)} cannot move every axis a little (joints {which})"
+def _why(chain: SerialChain, tolerance: float) -> str:
+    # displacements are measured in the arm's size, shares of columns in their own
+    found = convention_properties(chain, tolerance=10 * tolerance).joints
+    joints = ", ".join(str(j.joint) for j in found if not j.is_complete)
+    return f"{_conventions(chain)} cannot move every axis a little (joints {joints})"
