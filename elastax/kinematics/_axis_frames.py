@@ -137,7 +137,8 @@ def denavit_row(walk: Walk, line: Line, k: int) -> Row:
         normal, a = -normal, -a
     theta = np.arctan2(normal[1], normal[0])
     across = np.array([-normal[1], normal[0], 0.0])
-    return Row(theta, d, a, np.arctan2(-(z @ across), z[2]))
+    alpha = np.arctan2(-(z @ across), z[2])
+    return Row(float(theta), float(d), float(a), float(alpha))
 
 
 def tool_row(walk: Walk) -> Row:

@@ -9,9 +9,9 @@ displacements, and redundant where they are more than needed.
 
 from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 
+from .._custom_types import require_float64
 from ._axis_lines import axis_lines, characteristic_length
 from ._chain import SerialChain
 from ._dependence import dependent_columns
@@ -154,11 +154,12 @@ class _Local:
     """Transforms of the joints and their slopes, as numbers."""
 
     def __init__(self, chain: SerialChain):
+        require_float64("the rank of a joint convention")
         self.lines = axis_lines(chain)
         self.number = chain.number
         self.size = characteristic_length(chain)
         self.parameters = ChainParameters.of(chain, base=False, tool=False)
-        factors, slopes = factor_slopes(self.parameters, jnp.float64)
+        factors, slopes = factor_slopes(self.parameters, chain.base.dtype)
         self.factors, self.slopes = np.asarray(factors), np.asarray(slopes)
         self.axis = np.asarray(chain.joints.frames().axis, float)
         self.groups = [

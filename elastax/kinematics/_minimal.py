@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._custom_types import require_float64
 from ._axis_lines import axis_lines, characteristic_length
 from ._chain import SerialChain
 from ._convention_properties import convention_properties
@@ -99,6 +100,7 @@ def minimal_model(
     References:
         [KinModell] (3-10), (3-41), section 3.1.
     """
+    require_float64("a minimal model")
     count, length = parameter_count(chain), characteristic_length(chain)
     poses = random_poses(chain) if poses is None else poses
     conversion, keep = "", tuple(keep)

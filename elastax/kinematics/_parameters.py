@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 
 from .._custom_types import PerJoint
 from .._kernel import kernel
+from .._taylor import leading
 from ._chain import SerialChain, moving_frames
 from ._exponential import rotation_from_vector
 from ._joints import AbstractJoints
@@ -97,6 +98,8 @@ class ChainParameters(eqx.Module):
         """
         known = {entry.name: entry for entry in self.entries}
         names = list(names)
+        if not names:
+            raise ValueError("`names` must hold at least one parameter, but is empty")
         if missing := [name for name in names if name not in known]:
             raise ValueError(
                 f"the chain has no parameters {missing}: it has {', '.join(known)}"
@@ -216,11 +219,11 @@ def _factor_slope(parameters: ChainParameters, direction: Vector):
 def _fronts(chain: SerialChain, q: PerJoint):
     """Frame in front of every transform of `factor_slopes`, and the tool's position."""
     frames = moving_frames(chain, q)
-    moving = transform(frames.rotation, frames.position)
+    moving = transform(leading(frames.rotation), leading(frames.position))
     links = moving @ chain.joints.frames().after
     first = jnp.stack([jnp.eye(4, dtype=moving.dtype), chain.base])
     fronts = jnp.concatenate([first, links[:-1], moving, links[-1:]])
-    return fronts, frames.tool_position
+    return fronts, leading(frames.tool_position)
 
 
 def _is_mixed(joints: AbstractJoints) -> bool:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._custom_types import PerJoint
+from .._custom_types import PerJoint, require_float64
 from ._axis_lines import axis_lines, characteristic_length
 from ._chain import SerialChain
 from ._dependence import dependent_columns
@@ -152,6 +152,7 @@ def combinations(
 
 
 def _singularity(names, matrix, scale, full: int, tolerance: float) -> Singularity:
+    require_float64("the rank of a Jacobian")
     kept, left, factors, condition = dependent_columns(matrix, tolerance)
     values = np.linalg.svd(matrix, compute_uv=False)
     smallest = float(values[full - 1]) if full <= len(values) else 0.0

@@ -10,6 +10,7 @@ from elastax.kinematics import (
     characteristic_length,
     forward_kinematics,
     jacobian,
+    to_dh,
 )
 
 from tests.helpers import assert_close
@@ -43,8 +44,6 @@ def test_characteristic_length():
 
 
 def test_far_origins_are_brought_near():
-    from elastax.kinematics import to_dh
-
     chain = disturbed(ur(), 1e-5)
     far = to_dh(chain)
     assert np.max(np.abs(far.joints.d)) > 1e2

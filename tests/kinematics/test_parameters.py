@@ -111,6 +111,11 @@ def test_gradient():
     assert_gradient(pose, chain, zero, q)
 
 
+def test_gradient_of_the_jacobian():
+    some = ChainParameters.of(CHAINS["hayati"]).select(["beta_1", "a_2", "tool_rx"])
+    assert_gradient(parameter_jacobian, some, Q)
+
+
 def test_jit_vmap_and_loop_agree():
     parameters = ChainParameters.of(CHAINS["rpy"]).select(["rpy_2_x", "tool_rz"])
     poses = jnp.asarray(np.random.default_rng(0).uniform(-2, 2, (3, 5)))
@@ -137,6 +142,8 @@ def test_refusals():
         parameters.select(["beta_2", "a_1"])
     with pytest.raises(ValueError, match="named once"):
         parameters.select(["a_1", "a_1"])
+    with pytest.raises(ValueError, match="at least one parameter"):
+        parameters.select([])
     with pytest.raises(ValueError, match="one number per parameter of 36"):
         parameters.moved(jnp.zeros(35))
     with pytest.raises(ValueError, match="as structure"):
