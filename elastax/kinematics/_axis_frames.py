@@ -19,6 +19,8 @@ _ROUNDED = 4e-15  # what trigonometric functions leave of a zero
 
 
 class Row(NamedTuple):
+    """Parameters of a joint [m] and [rad]."""
+
     theta: float = 0.0
     d: float = 0.0
     a: float = 0.0
