@@ -105,8 +105,8 @@ class Walk:
         self.rows.append(row)
         self.frame = self.frame @ row.matrix()
 
-    def column(self, name: str, start: int = 0) -> np.ndarray:
-        return np.array([getattr(row, name) for row in self.rows[start:]])
+    def column(self, name: str) -> np.ndarray:
+        return np.array([getattr(row, name) for row in self.rows])
 
     def rest(self) -> np.ndarray:
         """The tool in the last frame."""

@@ -213,6 +213,8 @@ def test_kept_parameters():
 
 
 def test_refusals():
+    with jax.enable_x64(False), pytest.raises(ValueError, match="double precision"):
+        minimal_model(coaxial())
     with pytest.raises(ValueError, match="tell 18 parameters apart, but these 2 tell"):
         minimal_model(coaxial(), poses=jnp.ones((2, 3)))
 
