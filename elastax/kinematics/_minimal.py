@@ -175,7 +175,8 @@ def _select(matrix: np.ndarray, first: list[int], tolerance: float) -> list[int]
 
 
 def _places(parameters: ChainParameters, names: tuple[str, ...]) -> list[int]:
-    parameters.select(names)  # refuses unknown names
+    if names:
+        parameters.select(names)  # refuses unknown names
     return [parameters.names.index(name) for name in names]
 
 
