@@ -88,6 +88,32 @@ def test_tool_stays_for_every_q(convert, name):
     assert_same_tool(convert(reference(name)[0]), name)
 
 
+def random_chain(rng):
+    """Axes and offsets along the frame's or anywhere, so that special cases abound."""
+
+    def vector(zero):
+        kind = rng.choice(["axis", "axis", "zero" if zero else "axis", "any"])
+        basis = rng.choice([-1.0, 1.0]) * np.eye(3)[rng.integers(3)]
+        free = rng.standard_normal(3)
+        return {"axis": basis, "zero": 0 * basis, "any": free / np.linalg.norm(free)}[
+            kind
+        ]
+
+    joints = [np.array([vector(zero) for _ in range(5)]) for zero in (True, False)]
+    turn = rotation_from_vector(jnp.asarray(rng.choice([0.0, 0.7]) * vector(True)))
+    tool = transform(turn, jnp.asarray(vector(True)))
+    return SerialChain.from_rpy(joints[0], np.zeros((5, 3)), joints[1], tool=tool)
+
+
+def test_random_chains():
+    rng = np.random.default_rng(2)
+    for _ in range(25):
+        chain, q = random_chain(rng), jnp.asarray(rng.uniform(-3, 3, (8, 5)))
+        expected = poses(chain, q)
+        for convert in (to_dh, to_modified_dh, to_veitschegger_wu, to_rpy):
+            assert_close(poses(convert(chain), q), expected, rtol=0.0, atol=1e-12)
+
+
 @pytest.mark.parametrize("name", ["mixed", "scara"])
 def test_hayati_where_defined(name):
     converted = to_hayati(reference(name)[0])
