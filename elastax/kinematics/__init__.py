@@ -1,6 +1,11 @@
 """Homogeneous transforms, serial chains, Jacobians and inverse kinematics."""
 
 from ._arm import Arm as Arm
+from ._axis_lines import (
+    AxisLines as AxisLines,
+    axis_lines as axis_lines,
+    characteristic_length as characteristic_length,
+)
 from ._chain import (
     MovingFrames as MovingFrames,
     SerialChain as SerialChain,
@@ -16,6 +21,20 @@ from ._configuration import (
     fanuc_joint_angles as fanuc_joint_angles,
     kuka_configuration as kuka_configuration,
     kuka_joint_angles as kuka_joint_angles,
+)
+from ._convention_properties import (
+    ConventionProperties as ConventionProperties,
+    JointProperties as JointProperties,
+    convention_properties as convention_properties,
+    joint_properties as joint_properties,
+)
+from ._convert import (
+    to_dh as to_dh,
+    to_hayati as to_hayati,
+    to_mixed as to_mixed,
+    to_modified_dh as to_modified_dh,
+    to_rpy as to_rpy,
+    to_veitschegger_wu as to_veitschegger_wu,
 )
 from ._damping import (
     AbstractDamping as AbstractDamping,
@@ -100,10 +119,17 @@ from ._link_conventions import (
     ModifiedDHJoints as ModifiedDHJoints,
     VeitscheggerWuJoints as VeitscheggerWuJoints,
 )
+from ._minimal import (
+    MinimalModel as MinimalModel,
+    minimal_model as minimal_model,
+    parameter_count as parameter_count,
+    random_poses as random_poses,
+)
 from ._parameters import (
     ChainParameters as ChainParameters,
     Parameter as Parameter,
     parameter_jacobian as parameter_jacobian,
+    stacked_jacobian as stacked_jacobian,
 )
 from ._pose_correction import (
     DeformableArm as DeformableArm,
@@ -136,6 +162,12 @@ from ._separation import (
     link_transforms as link_transforms,
     separated_equation as separated_equation,
     separated_equations as separated_equations,
+)
+from ._singularities import (
+    Combination as Combination,
+    Singularity as Singularity,
+    drive_singularity as drive_singularity,
+    parameter_singularity as parameter_singularity,
 )
 from ._structured import (
     SAME as SAME,

@@ -1,4 +1,4 @@
-"""Joint conventions besides Denavit and Hartenberg's, and chains that mix them."""
+"""Joint conventions beyond Denavit and Hartenberg's, and chains that mix them."""
 
 import equinox as eqx
 import jax

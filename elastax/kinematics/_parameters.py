@@ -11,7 +11,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._custom_types import PerJoint
-from ._chain import SerialChain, forward_kinematics
+from .._kernel import kernel
+from .._taylor import leading
+from ._chain import SerialChain, moving_frames
 from ._exponential import rotation_from_vector
 from ._joints import AbstractJoints
 from ._link_conventions import MixedJoints
@@ -32,11 +34,13 @@ class Parameter(NamedTuple):
         unit: "m" or "rad".
         place: group of joints (0 unless conventions are mixed), field, and position in
             the field, or the end of the chain and the number of the coordinate.
+        joint: number of the joint, from one; 0 at the ends of the chain.
     """
 
     name: str
     unit: str
     place: tuple[Any, ...]
+    joint: int = 0
 
 
 class ChainParameters(eqx.Module):
@@ -94,10 +98,14 @@ class ChainParameters(eqx.Module):
         """
         known = {entry.name: entry for entry in self.entries}
         names = list(names)
+        if not names:
+            raise ValueError("`names` must hold at least one parameter, but is empty")
         if missing := [name for name in names if name not in known]:
             raise ValueError(
                 f"the chain has no parameters {missing}: it has {', '.join(known)}"
             )
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise ValueError(f"parameters must be named once, but {twice} are not")
         return ChainParameters(self.chain, tuple(known[name] for name in names))
 
     def without(self, names: Iterable[str]) -> "ChainParameters":
@@ -108,16 +116,25 @@ class ChainParameters(eqx.Module):
     def values(self) -> Vector:
         """Nominal values [m] and [rad]; zero where a deviation is a displacement."""
         dtype = self.chain.base.dtype
-        groups = _groups(self.chain.joints)
+        groups = joint_groups(self.chain.joints)
         return jnp.stack([_value(groups, entry, dtype) for entry in self.entries])
 
     def moved(self, deviation: Vector) -> SerialChain:
-        """The chain whose parameters deviate from the nominal ones by `deviation`."""
+        """The chain whose parameters deviate from the nominal ones by `deviation`.
+
+        Raises:
+            ValueError: there is not one deviation per parameter.
+        """
+        if jnp.shape(deviation) != (self.number,):
+            raise ValueError(
+                f"`deviation` must hold one number per parameter of {self.number}, but "
+                f"has the shape {jnp.shape(deviation)}"
+            )
         changes: dict[tuple, list[tuple[tuple, Any]]] = {}
         for entry, amount in zip(self.entries, deviation, strict=True):
             *field, index = entry.place
             changes.setdefault(tuple(field), []).append((index, amount))
-        groups = list(_groups(self.chain.joints))
+        groups = list(joint_groups(self.chain.joints))
         ends = {"base": self.chain.base, "tool": self.chain.tool}
         for field, amounts in changes.items():
             if len(field) == 1:
@@ -136,6 +153,9 @@ def parameter_jacobian(
 ) -> Float[Array, "6 parameters"]:
     """Geometric Jacobian of the tool by the parameters, translation above rotation.
 
+    A parameter moves one factor of the product of transforms, or the two of one joint;
+    the slopes of the factors do not depend on q.
+
     Args:
         parameters: of the chain, at their nominal values.
         q: joint coordinates [rad] or [m], shape (joints,).
@@ -145,29 +165,80 @@ def parameter_jacobian(
         parameter.
 
     References:
-        [KinModell] (3-41), (3-100).
+        [KinModell] (3-20), (3-41), (3-100).
     """
-    pose = lambda x: forward_kinematics(parameters.moved(x), q)
-    zero = jnp.zeros((parameters.number,), q.dtype)
-    rotation = pose(zero)[:3, :3]
-    slopes = jax.jacfwd(pose)(zero)
-    turns = jnp.einsum("ijk,lj->ilk", slopes[:3, :3], rotation)
-    vee = jnp.stack([turns[2, 1], turns[0, 2], turns[1, 0]])
-    return jnp.concatenate([slopes[:3, 3], vee])
+    factors, slopes = factor_slopes(parameters, q.dtype)
+    fronts, tool = _fronts(parameters.chain, q)
+    rotation, origin = fronts[:, :3, :3], fronts[:, :3, 3]
+    turns = jnp.einsum("kijp,klj->kilp", slopes[:, :3, :3], factors[:, :3, :3])
+    turn = jnp.stack([turns[:, 2, 1], turns[:, 0, 2], turns[:, 1, 0]], axis=1)
+    # from the origin of the moved frame to the tool, in the frame in front
+    ahead = jnp.einsum("kba,kb->ka", rotation, tool[None] - origin)
+    lever = ahead - factors[:, :3, 3]
+    shift = slopes[:, :3, 3] + jnp.cross(turn, lever[..., None], axis=1)
+    columns = [jnp.einsum("kab,kbp->ap", rotation, move) for move in (shift, turn)]
+    return jnp.concatenate(columns)
+
+
+def stacked_jacobian(
+    parameters: ChainParameters, poses: Float[Array, "poses joints"]
+) -> Float[Array, "rows parameters"]:
+    """Parameter Jacobians of some poses, one below the other."""
+    stack = jax.vmap(parameter_jacobian, (None, 0))(parameters, poses)
+    return stack.reshape(-1, parameters.number)
+
+
+def factor_slopes(parameters: ChainParameters, dtype):
+    """Transforms whose product with the motions is the chain, and their slopes.
+
+    Returns:
+        The base, those in front of the motions, those behind, the tool, shape
+        (2 joints + 2, 4, 4); their derivatives by the parameters, one more axis.
+    """
+
+    directions = jnp.eye(parameters.number, dtype=dtype)
+    along = jax.vmap(_factor_slope, (None, 0), (0, -1))
+    factors, slopes = along(parameters, directions)
+    return factors[0], slopes
+
+
+@kernel
+def _factor_slope(parameters: ChainParameters, direction: Vector):
+    """Transforms of the chain and their derivatives along a direction."""
+
+    def factors(deviation):
+        chain = parameters.moved(deviation)
+        frames = chain.joints.frames()
+        parts = (chain.base[None], frames.before, frames.after, chain.tool[None])
+        return jnp.concatenate(parts)
+
+    return jax.jvp(factors, (jnp.zeros_like(direction),), (direction,))
+
+
+@kernel
+def _fronts(chain: SerialChain, q: PerJoint):
+    """Frame in front of every transform of `factor_slopes`, and the tool's position."""
+    frames = moving_frames(chain, q)
+    moving = transform(leading(frames.rotation), leading(frames.position))
+    links = moving @ chain.joints.frames().after
+    first = jnp.stack([jnp.eye(4, dtype=moving.dtype), chain.base])
+    fronts = jnp.concatenate([first, links[:-1], moving, links[-1:]])
+    return fronts, leading(frames.tool_position)
 
 
 def _is_mixed(joints: AbstractJoints) -> bool:
     return isinstance(joints, MixedJoints)
 
 
-def _groups(joints: AbstractJoints) -> tuple[AbstractJoints, ...]:
+def joint_groups(joints: AbstractJoints) -> tuple[AbstractJoints, ...]:
+    """Groups of mixed joints; other joints are one group."""
     return joints.groups if isinstance(joints, MixedJoints) else (joints,)
 
 
 def _joint_entries(joints: AbstractJoints) -> Iterator[Parameter]:
     """Parameters of the joints, joint by joint."""
     first = 1
-    for group, part in enumerate(_groups(joints)):
+    for group, part in enumerate(joint_groups(joints)):
         if _is_mixed(part):
             raise ValueError("groups of mixed joints must not be mixed themselves")
         for k in range(part.number()):
@@ -187,10 +258,11 @@ def _entries_of_joint(part, group: int, k: int, number: int) -> Iterator[Paramet
             )
         unit, place = _UNITS.get(field.name, "rad"), (group, field.name)
         if len(shape) == 1:
-            yield Parameter(f"{field.name}_{number}", unit, (*place, (k,)))
+            yield Parameter(f"{field.name}_{number}", unit, (*place, (k,)), number)
             continue
         for c, letter in enumerate("xyz"):
-            yield Parameter(f"{field.name}_{number}_{letter}", unit, (*place, (k, c)))
+            name = f"{field.name}_{number}_{letter}"
+            yield Parameter(name, unit, (*place, (k, c)), number)
 
 
 def _value(groups, entry: Parameter, dtype):
