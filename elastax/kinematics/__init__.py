@@ -56,6 +56,7 @@ from ._se3 import (
     rotation_z as rotation_z,
     transform as transform,
 )
+from ._singular_values import singular_values as singular_values
 from ._structured import (
     SAME as SAME,
     JointStructure as JointStructure,
