@@ -163,6 +163,7 @@ from ._separation import (
     separated_equation as separated_equation,
     separated_equations as separated_equations,
 )
+from ._singular_values import singular_values as singular_values
 from ._singularities import (
     Combination as Combination,
     Singularity as Singularity,

@@ -14,6 +14,7 @@ from ._chain import SerialChain, forward_kinematics
 from ._damping import AbstractDamping
 from ._jacobian import jacobian
 from ._se3 import rotation_error
+from ._singular_values import singular_values
 
 
 class PoseResults(eqx.Enumeration):
@@ -160,7 +161,7 @@ def smallest_singular_value(
     count = available if count is None else count
     if not 1 <= count <= available:
         raise ValueError(f"`count` must be from 1 to {available}, but is {count}")
-    return jnp.linalg.svd(jacobian, compute_uv=False)[count - 1]
+    return singular_values(jacobian)[count - 1]
 
 
 def solve_damped(
@@ -258,7 +259,7 @@ def solve_damped(
     matrix, _, norm, _ = evaluate(found)
     found = found + _resting(q, moving)
     _, moved_error, _ = scaled(chain, target, found)
-    largest = jnp.linalg.svd(matrix, compute_uv=False)[0]
+    largest = singular_values(matrix)[0]
     rounding = float(np.sqrt(jnp.finfo(q.dtype).eps))
     value = jnp.where(
         reached, rounding * largest, damping(smallest_singular_value(matrix))
