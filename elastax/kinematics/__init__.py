@@ -21,6 +21,13 @@ from ._dependence import (
     Dependence as Dependence,
     dependent_columns as dependent_columns,
 )
+from ._elementary import (
+    Element as Element,
+    ElementaryProduct as ElementaryProduct,
+    ElementKind as ElementKind,
+    elementary_pose as elementary_pose,
+)
+from ._elementary_chain import elementary_chain as elementary_chain
 from ._exponential import (
     rotation_from_vector as rotation_from_vector,
     transform_from_twist as transform_from_twist,
@@ -39,6 +46,14 @@ from ._ik_dls import (
     row_weights as row_weights,
     smallest_singular_value as smallest_singular_value,
     solve_damped as solve_damped,
+)
+from ._inverse_motion import (
+    AbstractRateInverse as AbstractRateInverse,
+    DampedRateInverse as DampedRateInverse,
+    ExactRateInverse as ExactRateInverse,
+    JointMotion as JointMotion,
+    LeastSquaresRateInverse as LeastSquaresRateInverse,
+    inverse_motion as inverse_motion,
 )
 from ._jacobian import (
     jacobian as jacobian,
@@ -61,10 +76,31 @@ from ._link_conventions import (
     ModifiedDHJoints as ModifiedDHJoints,
     VeitscheggerWuJoints as VeitscheggerWuJoints,
 )
+from ._motion import (
+    ToolMotion as ToolMotion,
+    motion_from_rpy as motion_from_rpy,
+    product_derivatives as product_derivatives,
+    rpy_derivatives as rpy_derivatives,
+    tool_derivatives as tool_derivatives,
+)
+from ._motion_limits import (
+    MotionCheck as MotionCheck,
+    MotionLimits as MotionLimits,
+    check_motion as check_motion,
+    motion_margins as motion_margins,
+)
 from ._parameters import (
     ChainParameters as ChainParameters,
     Parameter as Parameter,
     parameter_jacobian as parameter_jacobian,
+)
+from ._pose_derivatives import (
+    MultiIndices as MultiIndices,
+    elementary_jacobian as elementary_jacobian,
+    multi_indices as multi_indices,
+    pose_derivative as pose_derivative,
+    pose_gradient as pose_gradient,
+    pose_hessian as pose_hessian,
 )
 from ._se3 import (
     inverse_transform as inverse_transform,
@@ -84,4 +120,11 @@ from ._structured import (
     placement as placement,
     placements as placements,
     structured as structured,
+)
+from ._taylor_expansion import (
+    TaylorRemainder as TaylorRemainder,
+    pose_differentials as pose_differentials,
+    taylor_majorant as taylor_majorant,
+    taylor_polynomials as taylor_polynomials,
+    taylor_remainder as taylor_remainder,
 )
