@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 from .._checks import check_fields, check_values, is_concrete
 from .._custom_types import PerJoint, Transform, as_real
 from .._kernel import kernel
-from .._taylor import Series, leading, linear, product, sin_cos, skew
+from .._taylor import leading, linear, product, sin_cos, skew
 
 
 Values = Float[Array, " variables"]
@@ -134,9 +134,7 @@ class ElementaryProduct(eqx.Module):
                     structure = element.direction
                 else:
                     directions.append(element.direction)
-            places.append(
-                _Place(element.kind, structure, element.name, element.joint)
-            )
+            places.append(_Place(element.kind, structure, element.name, element.joint))
         return ElementaryProduct(
             _stacked(values, ()),
             _stacked(directions, (3,)),
@@ -298,7 +296,7 @@ def elementary_pose(factors: ElementaryProduct, q: PerJoint | None = None) -> Tr
 
 
 def _stacked(rows: list, shape: tuple[int, ...]) -> Any:
-    """Rows as one array; of NumPy where all numbers are known, which compiles nothing."""
+    """Rows as one array; NumPy where all numbers are known, which compiles nothing."""
     if not rows:
         return np.zeros((0, *shape))
     if is_concrete(*rows):

@@ -8,7 +8,7 @@ import numpy as np
 
 from .._checks import is_concrete
 from ._chain import SerialChain
-from ._elementary import X, Y, Z, Element, ElementaryProduct
+from ._elementary import Element, ElementaryProduct, X, Y, Z
 from ._joints import (
     AbstractJoints,
     DHJoints,
@@ -141,7 +141,9 @@ def _frame(part, k: int, joint: int, slides: bool) -> Iterator[Element]:
     yield _motion(_plain(part.axis)[k], joint, slides)
 
 
-def _by_frames(frames: JointFrames, k: int, joint: int, slides: bool) -> Iterator[Element]:
+def _by_frames(
+    frames: JointFrames, k: int, joint: int, slides: bool
+) -> Iterator[Element]:
     yield Element.fixed(_plain(frames.before)[k])
     yield _motion(_plain(frames.axis)[k], joint, slides)
     yield Element.fixed(_plain(frames.after)[k])
@@ -152,13 +154,19 @@ _CONVENTIONS: tuple[tuple[type, Callable], ...] = (
     (
         DHJoints,
         _table(
-            (_about, Z, "theta"), (_along, Z, "d"), (_along, X, "a"), (_about, X, "alpha")
+            (_about, Z, "theta"),
+            (_along, Z, "d"),
+            (_along, X, "a"),
+            (_about, X, "alpha"),
         ),
     ),
     (
         ModifiedDHJoints,
         _table(
-            (_about, X, "alpha"), (_along, X, "a"), (_about, Z, "theta"), (_along, Z, "d")
+            (_about, X, "alpha"),
+            (_along, X, "a"),
+            (_about, Z, "theta"),
+            (_along, Z, "d"),
         ),
     ),
     (

@@ -184,8 +184,8 @@ def inverse_motion(
         raise ValueError(f"`rows` must be distinct indices from 0 to 5, but is {rows}")
     if twists.ndim != 2 or twists.shape[1] != len(rows) or twists.shape[0] < 1:
         raise ValueError(
-            f"`twists` must have the shape (order, {len(rows)}), the order at least one, "
-            f"but has {twists.shape}"
+            f"`twists` must have the shape (order, {len(rows)}), the order one or "
+            f"more, but has {twists.shape}"
         )
     given = np.array(rows)
     weights = row_weights(jnp.asarray(characteristic_length, q.dtype), rows)

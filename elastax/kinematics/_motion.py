@@ -53,8 +53,8 @@ def tool_derivatives(
     r"""Motion of the tool from that of the joints.
 
     $\dot y = J\dot x$, $\ddot y = \dot J\dot x + J\ddot x$,
-    $\dddot y = \ddot J\dot x + 2\dot J\ddot x + J\dddot x$ and so on, with the geometric
-    Jacobian.
+    $\dddot y = \ddot J\dot x + 2\dot J\ddot x + J\dddot x$ and so on, with the
+    geometric Jacobian.
 
     Args:
         chain: the chain.
@@ -138,11 +138,11 @@ def rpy_derivatives(motion: ToolMotion) -> Float[Array, "terms 6"]:
     The derivative of the angles is $E^{-1}\omega$, not $\omega$: this is the motion to
     which the analytic Jacobian belongs, $J_a = \mathrm{diag}(I, E^{-1}) J$.
 
-    At gimbal lock ($\cos\Theta_y$ below the square root of the rounding) the angles of a
-    motion exist only where the body does not turn about the lost direction. There
-    $\Theta_z$ is held at zero and the others follow what remains: everything stays
-    finite, and $\omega = E\dot\Theta$ holds but for the lost direction. Next to it
-    derivative k grows with $1/\cos^k\Theta_y$.
+    At gimbal lock ($\cos\Theta_y$ below the root of the rounding) a motion has angles
+    only where the body does not turn about the lost direction. There $\Theta_z$ is held
+    at zero and the others follow what remains: everything stays finite, and
+    $\omega = E\dot\Theta$ holds but for the lost direction. Next to it derivative k
+    grows with $1/\cos^k\Theta_y$.
 
     Args:
         motion: pose and twists.

@@ -105,7 +105,9 @@ class MotionCheck(eqx.Module):
             ]
             lines.append([_NAMES[order], *cells])
         widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-        rows = ["  ".join(x.ljust(w) for x, w in zip(r, widths)).rstrip() for r in lines]
+        rows = [
+            "  ".join(x.ljust(w) for x, w in zip(r, widths)).rstrip() for r in lines
+        ]
         verdict = "all limits hold" if self.holds else "limits are exceeded (!)"
         return "\n".join([*rows, f"{verdict}; slowdown {float(self.slowdown):.4g}"])
 

@@ -107,10 +107,11 @@ def taylor_majorant(
     r"""Bound of the remainder for every deviation up to given sizes.
 
     No derivative of a rotation is larger than one. With H the sum of the sizes of all
-    rotations, the remainder of the rotation matrix is at most $H^{m+1}/(m+1)!$. A length
-    l with the deviation $|h|$ behind rotations of the sum $H_l$ adds
-    $|l| H_l^{m+1}/(m+1)! + |h| H_l^m/m!$ to that of the position. The bound is met when
-    all axes are parallel and all arms stretched; each element is bounded by the norm.
+    rotations, the remainder of the rotation is at most $H^{m+1}/(m+1)!$. A length l
+    with the deviation $|h|$ behind rotations of the sum $H_l$ adds
+    $|l| H_l^{m+1}/(m+1)! + |h| H_l^m/m!$ to that of the position. The norms are met
+    when all axes are parallel, all arms stretched and the deviations add up; each
+    element is bounded by the norm of its block.
 
     Args:
         factors: the product, at $p_0$.
@@ -155,24 +156,37 @@ def _length(vector: Float[Array, "3"]) -> Scalar:
 
 
 def taylor_remainder(
-    factors: ElementaryProduct, deviation: Values, order: int, q: PerJoint | None = None
+    factors: ElementaryProduct,
+    deviation: Values,
+    order: int,
+    q: PerJoint | None = None,
+    *,
+    terms: int = 3,
 ) -> TaylorRemainder:
     r"""What the Taylor polynomial leaves out for a given deviation.
 
-    The bound is the smaller of `taylor_majorant`, and of the magnitude of the next term
-    plus the majorant of one order more; the latter is close to the remainder itself
-    where the deviations are small.
+    The remainder is the sum of the next terms plus the remainder behind them, which the
+    majorant bounds: $|R_m| \le |\sum_{k=m+1}^{m+r} d^k T/k!| + \hat R_{m+r}$. The bound
+    is the smaller of that and of $\hat R_m$; three terms are enough for some degrees in
+    each of the twenty angles of an arm.
 
     Args:
         factors: the product, at $p_0$.
         deviation: h of all variables [m] or [rad], shape (variables,).
         order: m of the polynomial.
         q: coordinates of the joints at $p_0$, zero unless given.
+        terms: r >= 1, next terms that are summed for the bound.
+
+    Raises:
+        ValueError: `order` is negative, or there are no terms.
 
     References:
         [KinModell] (3-35.5).
     """
-    estimate = jnp.abs(_terms(factors, deviation, order + 1, q)[order + 1])
-    direct = taylor_majorant(factors, deviation, order, q)
-    later = estimate + taylor_majorant(factors, deviation, order + 1, q)
-    return TaylorRemainder(estimate, jnp.minimum(direct, later))
+    if terms < 1:
+        raise ValueError(f"`terms` must be at least one, but is {terms}")
+    following = _terms(factors, deviation, order + terms, q)[order + 1 :]
+    rest = taylor_majorant(factors, deviation, order + terms, q)
+    later = jnp.abs(jnp.sum(following, axis=0)) + rest
+    bound = jnp.minimum(taylor_majorant(factors, deviation, order, q), later)
+    return TaylorRemainder(jnp.abs(following[0]), bound)

@@ -69,16 +69,16 @@ def coefficients(function, radius=0.5, points=64):
     circle = radius * np.exp(2j * np.pi * np.arange(points) / points)
     values = np.array([function(t) for t in circle])
     result = np.fft.fft(values, axis=0)[: ORDER + 1].real / points
-    return result / radius ** np.arange(ORDER + 1).reshape(-1, *(1,) * (values.ndim - 1))
+    return result / radius ** np.arange(ORDER + 1).reshape(
+        -1, *(1,) * (values.ndim - 1)
+    )
 
 
 def spin_coefficients(rotation):
     r"""Coefficients of omega from those of R, by $\tilde\omega = \dot R R^T$."""
     result = []
     for k in range(ORDER):
-        turn = sum(
-            (i + 1) * rotation[i + 1] @ rotation[k - i].T for i in range(k + 1)
-        )
+        turn = sum((i + 1) * rotation[i + 1] @ rotation[k - i].T for i in range(k + 1))
         result.append([turn[2, 1], turn[0, 2], turn[1, 0]])
     return np.array(result)
 
@@ -203,7 +203,7 @@ def test_angles_and_twists_are_inverse():
     # cos of the pitch is above a third: five orders lose some digits
     assert_close(rpy_derivatives(motion), angles, rtol=1e-10, atol=1e-11)
     # omega = E Theta' in its printed form
-    (x, y, z), rates = angles[0, 3:], angles[1, 3:]
+    (_, y, z), rates = angles[0, 3:], angles[1, 3:]
     E = np.array(
         [
             [np.cos(z) * np.cos(y), -np.sin(z), 0],

@@ -141,7 +141,9 @@ def test_any_order_is_nested_jvps():
     assert_close(actual, loop, rtol=0, atol=1e-15)
     # a rotation repeats itself after four orders, a translation is gone after one
     fourth = pose_derivative(factors, jnp.array([0, 0, 5, 0, 0]), q)
-    assert_close(fourth, pose_derivative(factors, jnp.array([0, 0, 1, 0, 0]), q), rtol=0)
+    assert_close(
+        fourth, pose_derivative(factors, jnp.array([0, 0, 1, 0, 0]), q), rtol=0
+    )
     assert not np.any(pose_derivative(factors, jnp.array([0, 2, 0, 0, 0]), q))
     assert_close(
         pose_derivative(factors, jnp.zeros(5, int), q),

@@ -5,7 +5,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from elastax.kinematics import (
-    Element,
     ElementaryProduct,
     elementary_chain,
     elementary_pose,
@@ -52,7 +51,7 @@ def test_differentials_are_multinomial_sums(order):
     indices = multi_indices(factors.number, order)
     every = jax.jit(jax.vmap(pose_derivative, (None, 0, None)))
     derivatives = every(factors, jnp.asarray(indices.orders), q)
-    powers = jnp.prod(deviation[None] ** indices.orders, axis=1)
+    powers = np.prod(np.asarray(deviation) ** indices.orders, axis=1)
     expected = jnp.einsum("t,tab->ab", indices.coefficients * powers, derivatives)
     actual = pose_differentials(factors, deviation, 3, q)
     assert_close(actual[order], expected, rtol=0, atol=1e-15)
@@ -92,10 +91,10 @@ def test_bounds_hold_and_are_not_loose(arm, order):
         largest = np.max(actual[block], axis=tuple(range(1, actual[block].ndim)))
         bounds = np.max(bound[block], axis=tuple(range(1, bound[block].ndim)))
         ratios = bounds / largest
-        # what is left of degrees behind the next term: at most a third of it
-        assert np.max(ratios) < 4.0, f"{name}: bound/actual up to {np.max(ratios):.2f}"
+        # three terms are summed; those behind them, if all adds up, are some per cent
+        assert np.max(ratios) < 1.05, f"{name}: bound/actual up to {np.max(ratios):.2f}"
         guess = np.max(estimate[block], axis=tuple(range(1, bound[block].ndim)))
-        assert np.all(guess > 0.5 * largest), f"{name}: estimate/actual too small"
+        assert np.all(guess > 0.9 * largest), f"{name}: estimate/actual too small"
 
 
 def test_majorant_is_met_by_parallel_axes():
