@@ -208,13 +208,14 @@ def inverse_motion(
             )
     else:
         general = inverse(matrix)
+    general = general * weights[None]  # of rows in their own units
 
-    derivatives, error = _recursion(chain, q, twists, general, weights, rows)
+    derivatives, error = _recursion(chain, q, twists, general, rows)
     return JointMotion(derivatives, error, smallest, is_regular)
 
 
 @kernel
-def _recursion(chain, q, twists, general, weights, rows):
+def _recursion(chain, q, twists, general, rows):
     """Derivatives of the joints, one order after the other, and what is left over.
 
     As one kernel: what the orders have in common is computed once.
@@ -224,6 +225,6 @@ def _recursion(chain, q, twists, general, weights, rows):
     derivatives = jnp.zeros((order + 1, chain.number), q.dtype).at[0].set(q)
     for k in range(order):
         # the highest derivative is still zero: what is there comes from the lower ones
-        rest = weights * (twists[k] - reached(derivatives)[k])
+        rest = twists[k] - reached(derivatives)[k]
         derivatives = derivatives.at[k + 1].set(general @ rest)
     return derivatives, twists - reached(derivatives)
