@@ -79,13 +79,14 @@ class LeastSquaresRateInverse(AbstractRateInverse):
     def __call__(
         self, jacobian: Float[Array, "rows joints"]
     ) -> Float[Array, "joints rows"]:
+        # by orthogonal factors: the product J J^T would square the condition
         rows, joints = jacobian.shape
         if rows > joints:
-            gram = jacobian.T @ jacobian
-            return jax.scipy.linalg.solve(gram, jacobian.T, assume_a="pos")
-        weights = jnp.broadcast_to(self.weights, (joints,))
-        light = jacobian.T / weights[:, None]
-        return jax.scipy.linalg.solve(jacobian @ light, light.T, assume_a="pos").T
+            Q, R = jnp.linalg.qr(jacobian)
+            return jax.scipy.linalg.solve_triangular(R, Q.T)
+        light = 1 / jnp.sqrt(jnp.broadcast_to(self.weights, (joints,)))[:, None]
+        Q, R = jnp.linalg.qr(light * jacobian.T)
+        return light * jax.scipy.linalg.solve_triangular(R, Q.T).T
 
     def is_bounded(self) -> bool:
         return False

@@ -61,13 +61,17 @@ def pose_differentials(
     References:
         [KinModell] (3-35.2), which equals the sum (3-36) over `multi_indices`.
     """
+    return _series(factors, deviation, order, q).derivatives()
+
+
+def _series(factors, deviation, order, q) -> Series:
+    """The pose along the line, as a power series."""
     if order < 0:
         raise ValueError(f"`order` must not be negative, but is {order}")
     start = factors.values_at(q)
     rest = jnp.zeros((max(order - 1, 0), *start.shape), start.dtype)
     line = jnp.concatenate([jnp.stack([start, deviation])[: order + 1], rest])
-    pose = elementary_product(factors, Series(line))
-    return pose.derivatives()
+    return elementary_product(factors, Series(line))
 
 
 def taylor_polynomials(
@@ -91,14 +95,10 @@ def taylor_polynomials(
         [KinModell] (3-35), (3-37); the print of the recursion mixes the polynomial with
         and without its remainder.
     """
-    return jnp.cumsum(_terms(factors, deviation, order, q), axis=0)
-
-
-def _terms(factors, deviation, order, q) -> Poses:
-    factorials = [float(math.factorial(k)) for k in range(order + 1)]
     differentials = pose_differentials(factors, deviation, order, q)
+    factorials = [float(math.factorial(k)) for k in range(order + 1)]
     scale = jnp.asarray(factorials, differentials.dtype)[:, None, None]
-    return differentials / scale
+    return jnp.cumsum(differentials / scale, axis=0)
 
 
 def taylor_majorant(
@@ -185,7 +185,9 @@ def taylor_remainder(
     """
     if terms < 1:
         raise ValueError(f"`terms` must be at least one, but is {terms}")
-    following = _terms(factors, deviation, order + terms, q)[order + 1 :]
+    # as it is written: for a kernel this is too much to compile
+    series = _series(factors, deviation, order + terms, q)
+    following = series.coefficients[order + 1 :]
     rest = taylor_majorant(factors, deviation, order + terms, q)
     later = jnp.abs(jnp.sum(following, axis=0)) + rest
     bound = jnp.minimum(taylor_majorant(factors, deviation, order, q), later)

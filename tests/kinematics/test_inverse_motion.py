@@ -81,7 +81,7 @@ def test_batches_and_gradient():
     loop = jnp.stack([solve(chain, q) for q in batch])
     mapped = jax.jit(jax.vmap(solve, (None, 0)))(chain, batch)
     assert_close(mapped, loop, rtol=0, atol=1e-12)
-    twists = tool_derivatives(chain, batch[0][:4]).twists
+    twists = tool_derivatives(chain, batch[0][:3]).twists
     answer = lambda q, twists: inverse_motion(chain, q, twists).derivatives
     assert_gradient(answer, REGULAR, twists)
 
@@ -110,7 +110,10 @@ def test_redundant_arm():
     weights = np.array([1.0, 4, 1, 9, 1, 1, 2])
     inverse = LeastSquaresRateInverse(weights)
     motion = inverse_motion(chain, q, twists, inverse=inverse)
-    assert_close(tool_derivatives(chain, motion.derivatives).twists, twists, rtol=1e-10)
+    reached = tool_derivatives(chain, motion.derivatives).twists
+    # rounding of the largest derivative of a joint
+    scale = np.max(np.abs(motion.derivatives))
+    assert_close(reached, twists, rtol=0, atol=1e-14 * scale)
     matrix = np.asarray(jacobian(chain, q))
     free = np.linalg.svd(matrix)[2][-1]
     # stationary: W x is orthogonal to the null space
@@ -118,7 +121,7 @@ def test_redundant_arm():
     assert abs(along) < 1e-12
     plain = inverse_motion(chain, q, twists, inverse=LeastSquaresRateInverse())
     expected = np.linalg.pinv(matrix) @ np.asarray(twists[0])
-    assert_close(plain.derivatives[1], expected, rtol=1e-10)
+    assert_close(plain.derivatives[1], expected, rtol=1e-12)
 
 
 def test_more_rows_than_joints():
@@ -160,7 +163,7 @@ def test_singular_poses(chain, pose):
     assert np.linalg.norm(motion.derivatives[1]) < bound
     for function in (masked, damped):
         slopes = jax.jit(jax.jacrev(lambda q, y: function(q, y).derivatives, (0, 1)))
-        assert all(np.all(np.isfinite(s)) for s in slopes(q, twists))
+        assert all(np.all(np.isfinite(s)) for s in slopes(q, twists[:2]))
 
 
 def test_little_damping_is_none():

@@ -240,7 +240,7 @@ def test_gimbal_lock(side):
     ids=["stretched", "coaxial wrist"],
 )
 def test_singular_poses_have_gradients(chain, pose):
-    q = Sines(5).derivatives().at[0].set(jnp.asarray(pose))
+    q = Sines(5).derivatives()[:4].at[0].set(jnp.asarray(pose))
     assert_gradient(tool_derivatives, chain, q)
 
 
@@ -250,7 +250,7 @@ def test_gradients_and_batches():
     loop = jnp.stack([full(chain, q) for q in batch])
     mapped = jax.jit(jax.vmap(full, (None, 0)))(chain, batch)
     assert_close(mapped, loop, rtol=1e-11, atol=1e-12)
-    assert_gradient(full, chain, batch[0][:4])
+    assert_gradient(full, chain, batch[0][:3])
 
 
 def test_refusals():

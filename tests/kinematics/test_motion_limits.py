@@ -74,7 +74,7 @@ def test_arm_and_missing_limits():
     assert_close(check.ratios[1, 0], np.pi / 3, rtol=1e-12)
     assert not np.any(check.ratios[2])
     # a joint that turns forever, and one with a single end
-    open_ = MotionLimits(np.array([-np.inf, -1.0]), np.array([np.inf, np.inf]))
+    open_ = MotionLimits(np.array([-np.inf, 0.0]), np.array([np.inf, np.inf]))
     assert_close(check_motion(open_, sines()).ratios[0], [0.0, 0.5], rtol=1e-12)
 
 
@@ -88,7 +88,11 @@ def test_table_says_what_is_exceeded():
 
 def test_gradients_and_batches():
     motion = sines()[:, ::20]
-    assert_gradient(motion_margins, LIMITS, motion)
+    one = np.ones(2)
+    finite = MotionLimits(-2 * one, 3 * one, 4 * one, 10 * one, 50 * one)
+    assert_gradient(motion_margins, finite, motion)
+    slope = jax.jit(jax.jacrev(lambda m: motion_margins(LIMITS, m)))(motion)
+    assert np.all(np.isfinite(slope))
     batch = jnp.stack([motion, 0 * motion])
     mapped = jax.jit(jax.vmap(check_motion, (None, 0)))(LIMITS, batch)
     loop = [check_motion(LIMITS, m) for m in batch]
