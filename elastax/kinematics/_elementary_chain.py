@@ -79,14 +79,13 @@ def _joint_elements(joints: AbstractJoints, kinds: tuple) -> Iterator[Element]:
     for part in groups:
         if isinstance(part, MixedJoints):
             raise ValueError("groups of mixed joints must not be mixed themselves")
-        rule = next((r for t, r in _CONVENTIONS if isinstance(part, t)), None)
-        number = part.number()
-        if rule is None:
-            part, rule = part.frames(), _by_frames
-        for k in range(number):
+        known = [rule for kind, rule in _CONVENTIONS if isinstance(part, kind)]
+        rule: Any = known[0] if known else _by_frames
+        given = part if known else part.frames()
+        for k in range(part.number()):
             slides = kinds[first + k] is JointKind.PRISMATIC
-            yield from rule(part, k, first + k, slides)
-        first += number
+            yield from rule(given, k, first + k, slides)
+        first += part.number()
 
 
 def _table(*steps: tuple[Callable, tuple, str | None]) -> Callable:

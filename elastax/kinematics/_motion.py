@@ -5,6 +5,8 @@ Truncated Taylor arithmetic carries them through the chain, so that no derivativ
 Jacobian is written down.
 """
 
+from typing import Any
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -126,7 +128,7 @@ def _check_order(derivatives) -> None:
         )
 
 
-def _motion(rotation: Series, position: Series, spin: Series) -> ToolMotion:
+def _motion(rotation: Any, position: Any, spin: Any) -> ToolMotion:
     twists = concatenate([position.rate(), spin]).derivatives()
     return ToolMotion(transform(leading(rotation), leading(position)), twists)
 

@@ -160,14 +160,14 @@ class _Columns(NamedTuple):
 def _columns(factors: ElementaryProduct, q: PerJoint | None) -> _Columns:
     _, _, direction = factors.along_and_about()
     matrices = elementary_matrices(factors, factors.values_at(q))
-    axes, origins, total, variable = [], [], None, 0
+    total = jnp.eye(4, dtype=matrices.dtype)
+    axes, origins, variable = [], [], 0
     for place, matrix in zip(factors.places, factors.in_order(matrices), strict=True):
         if place.kind is not ElementKind.FIXED:
-            axis = direction[variable]
-            axes.append(axis if total is None else total[:3, :3] @ axis)
-            origins.append(jnp.zeros_like(axis) if total is None else total[:3, 3])
+            axes.append(total[:3, :3] @ direction[variable])
+            origins.append(total[:3, 3])
             variable += 1
-        total = matrix if total is None else total @ matrix
+        total = total @ matrix
     along, about, _ = factors.along_and_about()
     axis, origin = jnp.stack(axes), jnp.stack(origins)
     turning = jnp.asarray(about, axis.dtype)[:, None] * axis
