@@ -102,6 +102,7 @@ from ._pose_derivatives import (
     pose_gradient as pose_gradient,
     pose_hessian as pose_hessian,
 )
+from ._resolved_motion import resolved_motion as resolved_motion
 from ._se3 import (
     inverse_transform as inverse_transform,
     rotation_about as rotation_about,

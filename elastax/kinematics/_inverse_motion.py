@@ -1,6 +1,7 @@
 """Motion of the joints, to any order, that gives the tool its motion."""
 
 import abc
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -180,14 +181,7 @@ def inverse_motion(
         printed symbols look like inverses of the differentiated Jacobian, and the print
         asks for their determinants; only that of J itself matters.
     """
-    rows = tuple(rows)
-    if len(set(rows)) != len(rows) or not rows or not set(rows) <= set(range(6)):
-        raise ValueError(f"`rows` must be distinct indices from 0 to 5, but is {rows}")
-    if twists.ndim != 2 or twists.shape[1] != len(rows) or twists.shape[0] < 1:
-        raise ValueError(
-            f"`twists` must have the shape (order, {len(rows)}), the order one or "
-            f"more, but has {twists.shape}"
-        )
+    rows = checked_rows(rows, twists)
     given = np.array(rows)
     weights = row_weights(jnp.asarray(characteristic_length, q.dtype), rows)
     matrix = weights[:, None] * jacobian(chain, q)[given]
@@ -213,6 +207,19 @@ def inverse_motion(
 
     derivatives, error = _recursion(chain, q, twists, general, rows)
     return JointMotion(derivatives, error, smallest, is_regular)
+
+
+def checked_rows(rows: tuple[int, ...], twists: Any) -> tuple[int, ...]:
+    """The chosen rows of a twist, if they are rows and `twists` has as many columns."""
+    rows = tuple(rows)
+    if len(set(rows)) != len(rows) or not rows or not set(rows) <= set(range(6)):
+        raise ValueError(f"`rows` must be distinct indices from 0 to 5, but is {rows}")
+    if twists.ndim != 2 or twists.shape[1] != len(rows) or twists.shape[0] < 1:
+        raise ValueError(
+            f"`twists` must have the shape (order, {len(rows)}), the order one or "
+            f"more, but has {twists.shape}"
+        )
+    return rows
 
 
 @kernel
