@@ -156,7 +156,7 @@ def inverse_motion(
 
     Each derivative is the inverse's answer for its own order. For redundant arms that
     is the smallest derivative of every order, and the tool's motion is met; it is not
-    the derivative of the law $\dot x = J^+\dot y$, which drifts in the null space. A
+    the derivative of the law $\dot x = J^+\dot y$, for which see `resolved_motion`. A
     damped inverse, or one with more rows than joints, leaves an `error`.
 
     Args:

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from .._checks import check_fields, check_values
+from .._checks import check_fields, check_values, is_concrete
 from .._custom_types import PerJoint, Scalar, as_optional_real, as_real
 from ._arm import Arm
 
@@ -85,6 +85,10 @@ class MotionCheck(eqx.Module):
     samples: Int[Array, "orders joints"]
     holds: Bool[Array, ""]
     slowdown: Scalar
+
+    def __str__(self) -> str:
+        one = is_concrete(self.ratios) and self.ratios.ndim == 2
+        return self.table() if one else repr(self)
 
     def table(self, times=None) -> str:
         """Worst use of every limit in percent, and when it occurs.
