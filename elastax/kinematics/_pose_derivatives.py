@@ -6,7 +6,7 @@ is the product of derivatives of its factors. Element (4, 4) of a derivative is 
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -218,9 +218,8 @@ def pose_gradient(
     References:
         [KinModell] (3-20), (3-30), (3-31); the print of the last two is lost.
     """
-    columns = _columns(factors, q)
-    rotation = skew(columns.turning) @ columns.pose[None, :3, :3]
-    return _without_scale(rotation, columns.moving)
+    _, slopes = _slopes(_columns(factors, q))
+    return jnp.pad(slopes, ((0, 0), (0, 1), (0, 0)))
 
 
 def pose_hessian(
@@ -229,7 +228,8 @@ def pose_hessian(
     r"""All second derivatives of the pose.
 
     With variable i in front of variable j, or i = j, the derivative is
-    $(\tilde w_i \tilde w_j R,\ w_i \times \partial t/\partial p_j)$.
+    $\tilde w_i\,(\partial R/\partial p_j,\ \partial t/\partial p_j)$, zero if i is a
+    translation.
 
     Args:
         factors: the product.
@@ -241,17 +241,15 @@ def pose_hessian(
     References:
         [KinModell] (3-28) to (3-31).
     """
-    columns = _columns(factors, q)
-    turn = skew(columns.turning)
-    slopes = turn @ columns.pose[None, :3, :3]
-    rotation = jnp.einsum("iab,jbc->ijac", turn, slopes)
-    position = jnp.einsum("iab,jb->ija", turn, columns.moving)
-    second = _without_scale(rotation, position)
+    turn, slopes = _slopes(_columns(factors, q))
+    second = jnp.einsum("iab,jbc->ijac", turn, slopes)
     in_front = np.tri(factors.number).T.astype(bool)[:, :, None, None]
-    return jnp.where(in_front, second, jnp.swapaxes(second, 0, 1))
+    second = jnp.where(in_front, second, jnp.swapaxes(second, 0, 1))
+    return jnp.pad(second, ((0, 0), (0, 0), (0, 1), (0, 0)))
 
 
-def _without_scale(rotation, position):
-    """Derivative of a homogeneous matrix: the last row stays zero."""
-    top = jnp.concatenate([rotation, position[..., None]], axis=-1)
-    return jnp.concatenate([top, jnp.zeros_like(top[..., :1, :])], axis=-2)
+def _slopes(columns: _Columns) -> tuple[Any, Any]:
+    """Cross products with the turning axes, and the upper rows of all derivatives."""
+    turn = skew(columns.turning)
+    rotation = turn @ columns.pose[None, :3, :3]
+    return turn, jnp.concatenate([rotation, columns.moving[:, :, None]], axis=2)
