@@ -184,7 +184,8 @@ def inverse_motion(
     rows = checked_rows(rows, twists)
     given = np.array(rows)
     weights = row_weights(jnp.asarray(characteristic_length, q.dtype), rows)
-    matrix = weights[:, None] * jacobian(chain, q)[given]
+    plain = jacobian(chain, q)[given]
+    matrix = weights[:, None] * plain
     size = jnp.sqrt(jnp.sum(jax.lax.stop_gradient(matrix) ** 2))
     smallest = smallest_singular_value(matrix)
     is_regular = smallest > tolerance * size
@@ -205,7 +206,7 @@ def inverse_motion(
         general = inverse(matrix)
     general = general * weights[None]  # of rows in their own units
 
-    derivatives, error = _recursion(chain, q, twists, general, rows)
+    derivatives, error = _recursion(chain, q, twists, general, plain, rows)
     return JointMotion(derivatives, error, smallest, is_regular)
 
 
@@ -223,16 +224,19 @@ def checked_rows(rows: tuple[int, ...], twists: Any) -> tuple[int, ...]:
 
 
 @kernel
-def _recursion(chain, q, twists, general, rows):
+def _recursion(chain, q, twists, general, matrix, rows):
     """Derivatives of the joints, one order after the other, and what is left over.
 
     As one kernel: what the orders have in common is computed once.
     """
     given, order = np.array(rows), twists.shape[0]
-    reached = lambda d: tool_derivatives(chain, d).twists[:, given]
     derivatives = jnp.zeros((order + 1, chain.number), q.dtype).at[0].set(q)
+    errors = []
     for k in range(order):
         # the highest derivative is still zero: what is there comes from the lower ones
-        rest = twists[k] - reached(derivatives)[k]
-        derivatives = derivatives.at[k + 1].set(general @ rest)
-    return derivatives, twists - reached(derivatives)
+        reached = tool_derivatives(chain, derivatives[: k + 2]).twists[k]
+        rest = twists[k] - reached[given]
+        highest = general @ rest
+        errors.append(rest - matrix @ highest)
+        derivatives = derivatives.at[k + 1].set(highest)
+    return derivatives, jnp.stack(errors)
