@@ -48,6 +48,13 @@ from ._dependence import (
     Dependence as Dependence,
     dependent_columns as dependent_columns,
 )
+from ._elementary import (
+    Element as Element,
+    ElementaryProduct as ElementaryProduct,
+    ElementKind as ElementKind,
+    elementary_pose as elementary_pose,
+)
+from ._elementary_chain import elementary_chain as elementary_chain
 from ._exponential import (
     rotation_from_vector as rotation_from_vector,
     transform_from_twist as transform_from_twist,
@@ -97,6 +104,14 @@ from ._ik_steps import (
     RestPostureStep as RestPostureStep,
     limit_step as limit_step,
 )
+from ._inverse_motion import (
+    AbstractRateInverse as AbstractRateInverse,
+    DampedRateInverse as DampedRateInverse,
+    ExactRateInverse as ExactRateInverse,
+    JointMotion as JointMotion,
+    LeastSquaresRateInverse as LeastSquaresRateInverse,
+    inverse_motion as inverse_motion,
+)
 from ._jacobian import (
     jacobian as jacobian,
     jacobian_derivatives as jacobian_derivatives,
@@ -125,6 +140,19 @@ from ._minimal import (
     parameter_count as parameter_count,
     random_poses as random_poses,
 )
+from ._motion import (
+    ToolMotion as ToolMotion,
+    motion_from_rpy as motion_from_rpy,
+    product_derivatives as product_derivatives,
+    rpy_derivatives as rpy_derivatives,
+    tool_derivatives as tool_derivatives,
+)
+from ._motion_limits import (
+    MotionCheck as MotionCheck,
+    MotionLimits as MotionLimits,
+    check_motion as check_motion,
+    motion_margins as motion_margins,
+)
 from ._parameters import (
     ChainParameters as ChainParameters,
     Parameter as Parameter,
@@ -136,6 +164,14 @@ from ._pose_correction import (
     PoseCorrection as PoseCorrection,
     correct_pose as correct_pose,
 )
+from ._pose_derivatives import (
+    MultiIndices as MultiIndices,
+    elementary_jacobian as elementary_jacobian,
+    multi_indices as multi_indices,
+    pose_derivative as pose_derivative,
+    pose_gradient as pose_gradient,
+    pose_hessian as pose_hessian,
+)
 from ._posture import (
     Posture as Posture,
     branch_index as branch_index,
@@ -145,6 +181,7 @@ from ._redundancy import (
     hard_and_soft as hard_and_soft,
     weighted_correction as weighted_correction,
 )
+from ._resolved_motion import resolved_motion as resolved_motion
 from ._se3 import (
     inverse_transform as inverse_transform,
     rotation_about as rotation_about,
@@ -178,5 +215,12 @@ from ._structured import (
     placement as placement,
     placements as placements,
     structured as structured,
+)
+from ._taylor_expansion import (
+    TaylorRemainder as TaylorRemainder,
+    pose_differentials as pose_differentials,
+    taylor_majorant as taylor_majorant,
+    taylor_polynomials as taylor_polynomials,
+    taylor_remainder as taylor_remainder,
 )
 from ._wrist_weights import WristWeights as WristWeights

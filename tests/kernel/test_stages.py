@@ -99,3 +99,18 @@ def test_costly_part_stands_in_front():
     assert len(inner) == len(outer) == 1
     assert "stablehlo.sine" not in inner[0] and "stablehlo.sine" in outer[0]
     assert np.all(np.isfinite(np.asarray(jax.jit(fused)(P, X)[0])))
+
+
+def test_conditions_read_by_two_stages(eager):
+    """A condition that both what is shared and what is not asks for."""
+
+    def function(p, x):
+        small = p[0] ** 2 + p[1] ** 2 < 0.5
+        rest = jnp.where(small, jnp.sin(p), p)
+        return rest, jnp.where(small, x, x * rest)
+
+    for place in (1, 2):
+        p = place * P
+        fused = jax.jit(jax.vmap(kernel(function), (None, 0)))
+        plain = jax.jit(jax.vmap(function, (None, 0)))
+        assert_close(fused(p, X), plain(p, X), rtol=1e-14)
