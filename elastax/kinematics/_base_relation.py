@@ -177,7 +177,9 @@ def _result(
     size = jax.lax.stop_gradient(
         jnp.sqrt(jnp.mean(jnp.sum(masters[:, :3, 3] ** 2, axis=1)))
     )
-    unit = jnp.tile(jnp.repeat(jnp.stack([jnp.ones_like(size), 1 / (size + weights[3])]), 3), 2)
+    unit = jnp.tile(
+        jnp.repeat(jnp.stack([jnp.ones_like(size), 1 / (size + weights[3])]), 3), 2
+    )
     values = jnp.linalg.svd(slopes * unit[None, :unknowns], compute_uv=False)
     rank = jnp.sum(values > tolerance * values[0])
     inverse = jnp.linalg.pinv(slopes)

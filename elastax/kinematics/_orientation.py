@@ -77,9 +77,9 @@ def rpy_solutions(
     r"""Both sets of roll-pitch-yaw angles of a rotation.
 
     $R = R_z(\Theta_z) R_y(\Theta_y) R_x(\Theta_x)$. In the first row
-    $\Theta_y \in [-\pi/2, \pi/2]$; the second one turns by $\Theta_z \pm \pi$ first, and
-    has $\Theta_y$ in the other half. In gimbal lock, $\cos\Theta_y = 0$ up to rounding,
-    both rows are equal, $\Theta_z$ is kept and does not depend on `rotation`.
+    $\Theta_y \in [-\pi/2, \pi/2]$; the second one turns by $\Theta_z \pm \pi$ first,
+    and has $\Theta_y$ in the other half. In gimbal lock, $\cos\Theta_y = 0$ up to
+    rounding, both rows are equal, $\Theta_z$ is kept and does not depend on `rotation`.
 
     The text prints $R_y$ as the last factor of (3-15), which is $R_x$, and in (3-18)
     the other solution as $\pi - \arcsin t_{31}$ for $\pi + \arcsin t_{31}$; its

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._custom_types import PerJoint
+from .._kernel import kernel
 from ._chain import SerialChain, forward_kinematics
 from ._exponential import rotation_from_vector
 from ._joints import AbstractJoints
@@ -131,6 +132,7 @@ class ChainParameters(eqx.Module):
         return SerialChain(joints, ends["base"], ends["tool"], self.chain.kinds)
 
 
+@kernel
 def parameter_jacobian(
     parameters: ChainParameters, q: PerJoint
 ) -> Float[Array, "6 parameters"]:

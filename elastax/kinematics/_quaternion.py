@@ -47,8 +47,8 @@ def quaternion_product(left, right):
 def rotation_from_quaternion(quaternion: Quaternion) -> Matrix3:
     r"""Rotation of a quaternion of any length but zero.
 
-    $R = I + \tfrac{2}{q^Tq}(w\,\tilde v + \tilde v\tilde v)$. A quaternion of the length
-    zero gives the identity.
+    $R = I + \tfrac{2}{q^Tq}(w\,\tilde v + \tilde v\tilde v)$. A quaternion of the
+    length zero gives the identity.
 
     Args:
         quaternion: (w, x, y, z), shape (4,).
