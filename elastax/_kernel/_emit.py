@@ -297,7 +297,9 @@ class _Kernel:
                 continue
             seen.add(node)
             given = self.graph.names[node] in ("constant", "input")
-            if not given and self.stages.depth[node] == depth:
+            # no row holds a condition: it is computed wherever it is read
+            here = self.stages.depth[node] == depth or node not in self.handed
+            if not given and here:
                 stack.extend(self.graph.operands[node])
         return sorted(seen)
 

@@ -24,9 +24,6 @@ from ._orientation import check_rotation
 from ._se3 import transform
 
 
-Poses = Float[Array, "samples 4 4"]
-
-
 class BaseRelation(eqx.Module):
     """Outcome of `identify_base_relation`.
 
@@ -60,8 +57,8 @@ class _State(NamedTuple):
 
 
 def identify_base_relation(
-    masters: Poses,
-    slaves: Poses,
+    masters: Float[Array, "samples 4 4"],
+    slaves: Float[Array, "pairs 4 4"],
     *,
     grasp: Transform | None = None,
     characteristic_length: Scalar | float = 1.0,
