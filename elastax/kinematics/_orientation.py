@@ -39,7 +39,9 @@ def check_rotation(rotation: AnyMatrix3, tolerance: float = 1e-6) -> AnyMatrix3:
             says by how much. Where the matrix is traced, a run-time error.
     """
     if not is_concrete(rotation):
-        deviation = jnp.max(jnp.abs(rotation.T @ rotation - np.eye(3)))
+        deviation = jnp.max(
+            jnp.abs(rotation.T @ rotation - jnp.eye(3, dtype=rotation.dtype))
+        )
         good = (deviation <= tolerance) & (jnp.linalg.det(rotation) > 0)
         return eqx.error_if(
             rotation,

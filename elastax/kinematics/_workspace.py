@@ -102,8 +102,8 @@ def pose_quality(
         arm: the arm.
         pose: of the tool in the base frame, shape (4, 4).
         lower, upper: joint limits [rad], shape (6,).
-        measure: of the geometric Jacobian, not negative, such as a function of
-            `_manipulability` behind a scaling of the rows.
+        measure: of the geometric Jacobian (6, 6), not negative, such as
+            `manipulability`; scale its rows first where metres and radians mix.
     """
     solutions, valid = inverse_kinematics(arm, pose)
     within = jax.vmap(_within, (0, None, None))(solutions, lower, upper)
