@@ -101,6 +101,7 @@ from ._manipulability import (
 from ._orientation import (
     abc_from_rotation as abc_from_rotation,
     check_rotation as check_rotation,
+    check_transform as check_transform,
     rotation_from_abc as rotation_from_abc,
     rotation_from_zxz as rotation_from_zxz,
     rpy_from_rotation as rpy_from_rotation,

@@ -20,7 +20,7 @@ from .._custom_types import Scalar, Transform, require_float64
 from ._cooperating import loop_error
 from ._exponential import transform_from_twist
 from ._ik_dls import row_weights
-from ._orientation import check_rotation
+from ._orientation import check_transform
 from ._se3 import transform
 
 
@@ -275,10 +275,8 @@ def _check_samples(masters, slaves) -> None:
     for name, poses in (("masters", masters), ("slaves", slaves)):
         if not is_concrete(poses):
             continue
-        if not np.all(np.isfinite(np.asarray(poses))):
-            raise ValueError(f"`{name}` must be finite, but hold NaN or infinity")
         for k, pose in enumerate(np.asarray(poses)):
             try:
-                check_rotation(pose[:3, :3])
+                check_transform(pose)
             except ValueError as error:
                 raise ValueError(f"`{name}[{k}]`: {error}") from None

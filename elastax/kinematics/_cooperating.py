@@ -13,12 +13,13 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._checks import check_fields
+from .._checks import check_fields, is_concrete
 from .._custom_types import PerJoint, Transform, as_real
 from .._kernel import kernel
 from ._chain import SerialChain, forward_kinematics
 from ._jacobian import jacobian, tool_motion
 from ._logarithm import twist_from_transform
+from ._orientation import check_transform
 from ._se3 import inverse_transform
 
 
@@ -43,6 +44,13 @@ class Cooperation(eqx.Module):
 
     def __check_init__(self):
         check_fields(self)
+        for name in ("relation", "grasp"):
+            pose = getattr(self, name)
+            if is_concrete(pose):
+                try:
+                    check_transform(pose)
+                except ValueError as error:
+                    raise ValueError(f"`{name}`: {error}") from None
 
 
 @kernel

@@ -13,12 +13,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._checks import is_concrete
-from .._custom_types import Matrix3, Scalar, Vector3
+from .._custom_types import Matrix3, Scalar, Transform, Vector3
 from .._kernel import kernel
 from ._se3 import rotation_from_rpy, rotation_x, rotation_z
 
 
 AnyMatrix3 = Matrix3 | Float[np.ndarray, "3 3"]
+AnyTransform = Transform | Float[np.ndarray, "4 4"]
 
 # in units of rounding: below it, noise moves the first angle by more than 1/64 rad
 _LOCKED = 64.0
@@ -70,6 +71,39 @@ def check_rotation(rotation: AnyMatrix3, tolerance: float = 1e-6) -> AnyMatrix3:
             f"{determinant:.6g}"
         )
     return rotation
+
+
+def check_transform(pose: AnyTransform, tolerance: float = 1e-6) -> AnyTransform:
+    """`pose`, if it is a rigid motion.
+
+    Args:
+        pose: homogeneous matrix, shape (4, 4).
+        tolerance: as for `check_rotation`, also of the last row.
+
+    Returns:
+        The same matrix; use it, or nothing is checked where it is traced.
+
+    Raises:
+        ValueError: the matrix is not finite, its rotation is none, or its last row is
+            not (0, 0, 0, 1). Where the matrix is traced, a run-time error.
+    """
+    if not is_concrete(pose):
+        turn = check_rotation(pose[:3, :3], tolerance)
+        last = jnp.abs(pose[3] - jnp.array([0.0, 0.0, 0.0, 1.0], pose.dtype))
+        return eqx.error_if(
+            pose.at[:3, :3].set(turn),
+            ~(jnp.all(jnp.isfinite(pose)) & jnp.all(last <= tolerance)),
+            "`pose` must be finite and have the last row (0, 0, 0, 1), but has not",
+        )
+    matrix = np.asarray(pose, float)
+    if not np.all(np.isfinite(matrix)):
+        raise ValueError(f"`pose` must be finite, but is {matrix.tolist()}")
+    if np.max(np.abs(matrix[3] - [0, 0, 0, 1])) > tolerance:
+        raise ValueError(
+            f"the last row of `pose` must be (0, 0, 0, 1), but is {matrix[3].tolist()}"
+        )
+    check_rotation(matrix[:3, :3], tolerance)
+    return pose
 
 
 @kernel

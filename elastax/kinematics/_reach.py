@@ -44,7 +44,7 @@ def reach_limits(
     *,
     centre: Vector3 | None = None,
     starts: Float[Array, "starts joints"] | None = None,
-    rounds: int = 100,
+    rounds: int = 300,
 ) -> ReachLimits:
     """Smallest and largest distance of the tool from a point.
 
@@ -57,7 +57,8 @@ def reach_limits(
         lower, upper: joint limits [rad] or [m], shape (joints,), finite.
         centre: the point in the base frame [m], its origin unless given.
         starts: joint coordinates to start from; 32 random ones unless given.
-        rounds: how often every joint is moved.
+        rounds: how often every joint is moved. Extremes at limits and stretched arms
+            take a few; a tool that can come to the point itself approaches it slowly.
     """
 
     def square(chain, q):
@@ -76,7 +77,7 @@ def extent(
     direction: Vector3,
     *,
     starts: Float[Array, "starts joints"] | None = None,
-    rounds: int = 100,
+    rounds: int = 300,
 ) -> ReachLimits:
     """Smallest and largest coordinate of the tool along a direction.
 
@@ -105,23 +106,25 @@ def _extremes(
     sliding = jnp.asarray([kind is JointKind.PRISMATIC for kind in chain.kinds])
     # by the envelope theorem only the limits move the extreme to first order
     fixed, low, high, starts = jax.lax.stop_gradient((chain, lower, upper, starts))
-    found = []
-    for sign in (-1.0, 1.0):
-        value = lambda q, s=sign: jax.lax.stop_gradient(s * function(fixed, q))
 
-        def climb(q, value=value):
-            def move(step, q):
-                k = step % chain.number
-                best = _best(
-                    lambda x: value(q.at[k].set(x)), q[k], low[k], high[k], sliding[k]
-                )
-                return q.at[k].set(best)
+    def climb(sign, q):
+        value = lambda q: jax.lax.stop_gradient(sign * function(fixed, q))
 
-            return jax.lax.fori_loop(0, rounds * chain.number, move, q)
+        def move(step, q):
+            k = step % chain.number
+            along = lambda x: value(q.at[k].set(x))
+            return q.at[k].set(_best(along, q[k], low[k], high[k], sliding[k]))
 
-        ends = jax.vmap(climb)(starts)
-        q = ends[jnp.argmax(jax.vmap(value)(ends))]
-        found.append(jnp.where(q <= low, lower, jnp.where(q >= high, upper, q)))
+        end = jax.lax.fori_loop(0, rounds * chain.number, move, q)
+        return end, value(end)
+
+    signs = jnp.array([-1.0, 1.0], low.dtype)
+    climbs = jax.vmap(jax.vmap(climb, (None, 0)), (0, None))
+    ends, values = climbs(signs, starts)
+    q = jnp.take_along_axis(ends, jnp.argmax(values, axis=1)[:, None, None], axis=1)
+    at_low, at_high = q[:, 0] <= low[None], q[:, 0] >= high[None]
+    found = jnp.where(at_high, upper[None], q[:, 0])
+    found = jnp.where(at_low, lower[None], found)
     return found[0], found[1]
 
 

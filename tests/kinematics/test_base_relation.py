@@ -166,5 +166,5 @@ def test_refuses_bad_samples():
         identify_base_relation(ahead, behind[:3])
     with pytest.raises(ValueError, match=r"`slaves\[2\]`: `rotation` must be orthog"):
         identify_base_relation(ahead, behind.at[2, 0, 0].add(0.01))
-    with pytest.raises(ValueError, match="`masters` must be finite"):
+    with pytest.raises(ValueError, match=r"`masters\[1\]`: `pose` must be finite"):
         identify_base_relation(ahead.at[1].set(jnp.nan), behind)

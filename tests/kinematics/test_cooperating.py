@@ -138,9 +138,12 @@ def test_planar_slave_follows_in_its_plane(follow):
         assert_close(residual, jnp.zeros(6), rtol=0.0, atol=1e-13)
 
 
-def test_refuses_poses_of_another_shape():
+def test_refuses_what_is_no_pose():
     with pytest.raises(ValueError, match="`grasp` of Cooperation must have the shape"):
         Cooperation(planar(1.0), planar(1.0), jnp.eye(4), jnp.eye(3))
+    with pytest.raises(ValueError, match="`relation`: `rotation` must be orthogonal"):
+        bent = jnp.eye(4).at[0, 1].set(0.1)
+        Cooperation(planar(1.0), planar(1.0), bent, jnp.eye(4))
 
 
 def test_gradient_and_batches(pair, follow):

@@ -9,6 +9,7 @@ import scipy.spatial.transform
 from elastax.kinematics import (
     abc_from_rotation,
     check_rotation,
+    check_transform,
     rotation_about,
     rotation_from_abc,
     rotation_from_rpy,
@@ -187,3 +188,20 @@ def test_check_of_traced_matrices():
     assert_close(check_rotation(good), good, rtol=0.0)
     with pytest.raises(RuntimeError, match="orthogonal and right-handed"):
         check(jnp.diag(jnp.array([1.0, -1.0, 1.0])))
+
+
+def test_check_of_poses():
+    good = jnp.eye(4).at[:3, 3].set(jnp.array([1.0, 2.0, 3.0]))
+    traced = eqx.filter_jit(check_transform)
+    assert_close(check_transform(good), good, rtol=0.0)
+    assert_close(traced(good), good, rtol=0.0)
+    bad = [
+        (good.T, r"last row of `pose` must be \(0, 0, 0, 1\)", "last row"),
+        (good.at[0, 3].set(jnp.inf), "`pose` must be finite", "must be finite"),
+        (good.at[0, 0].set(1.1), "must be orthogonal", "orthogonal"),
+    ]
+    for pose, message, traced_message in bad:
+        with pytest.raises(ValueError, match=message):
+            check_transform(pose)
+        with pytest.raises(RuntimeError, match=traced_message):
+            traced(pose)
