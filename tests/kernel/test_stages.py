@@ -99,3 +99,18 @@ def test_costly_part_stands_in_front():
     assert len(inner) == len(outer) == 1
     assert "stablehlo.sine" not in inner[0] and "stablehlo.sine" in outer[0]
     assert np.all(np.isfinite(np.asarray(jax.jit(fused)(P, X)[0])))
+
+
+def test_condition_that_is_read_in_front_of_a_loop_and_inside():
+    """No row holds it: each stage computes it from the numbers it compares."""
+
+    def function(p, x):
+        y = costly(p)
+        larger = y > 0.3
+        ahead = costly(jnp.where(larger, y, -y))
+        return jnp.where(larger, ahead * x, x - ahead)
+
+    fused = jax.jit(jax.vmap(kernel(function), (None, 0)))
+    plain = jax.jit(jax.vmap(function, (None, 0)))
+    # 120 sines, each rounded in its own way
+    assert_close(fused(P, X), plain(P, X), rtol=1e-12, atol=1e-14)
