@@ -199,11 +199,18 @@ def tool_compliance(
     matrix = jacobian(chain, q)
     compliance = 1 / stiffness
     if wrench is None:
-        return (matrix * compliance[None]) @ matrix.T
+        return _through_springs(matrix, compliance)
     softening = jax.jacfwd(lambda x: joint_torques(chain, x, wrench))(q)
     # (K - S)^-1 = (1 - K^-1 S)^-1 K^-1, finite for rigid joints
     spring = jnp.eye(chain.number, dtype=q.dtype) - compliance[:, None] * softening
     return matrix @ jnp.linalg.solve(spring, compliance[:, None] * matrix.T)
+
+
+@kernel
+def _through_springs(
+    matrix: Float[Array, "6 joints"], compliance: PerJoint
+) -> Float[Array, "6 6"]:
+    return (matrix * compliance[None]) @ matrix.T
 
 
 def tool_stiffness(
