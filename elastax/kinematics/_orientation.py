@@ -91,7 +91,7 @@ def check_transform(pose: AnyTransform, tolerance: float = 1e-6) -> AnyTransform
         turn = check_rotation(pose[:3, :3], tolerance)
         last = jnp.abs(pose[3] - jnp.array([0.0, 0.0, 0.0, 1.0], pose.dtype))
         return eqx.error_if(
-            pose.at[:3, :3].set(turn),
+            jnp.asarray(pose).at[:3, :3].set(turn),
             ~(jnp.all(jnp.isfinite(pose)) & jnp.all(last <= tolerance)),
             "`pose` must be finite and have the last row (0, 0, 0, 1), but has not",
         )
