@@ -1,10 +1,25 @@
 """Homogeneous transforms, serial chains, Jacobians and inverse kinematics."""
 
+from ._angle_rates import (
+    analytic_jacobian as analytic_jacobian,
+    angle_motion as angle_motion,
+    angular_velocity as angular_velocity,
+    quaternion_rate_matrix as quaternion_rate_matrix,
+    quaternion_rates as quaternion_rates,
+    rpy_rate_matrix as rpy_rate_matrix,
+    rpy_rates as rpy_rates,
+    zxz_rate_matrix as zxz_rate_matrix,
+    zxz_rates as zxz_rates,
+)
 from ._arm import Arm as Arm
 from ._axis_lines import (
     AxisLines as AxisLines,
     axis_lines as axis_lines,
     characteristic_length as characteristic_length,
+)
+from ._base_relation import (
+    BaseRelation as BaseRelation,
+    identify_base_relation as identify_base_relation,
 )
 from ._chain import (
     MovingFrames as MovingFrames,
@@ -35,6 +50,14 @@ from ._convert import (
     to_modified_dh as to_modified_dh,
     to_rpy as to_rpy,
     to_veitschegger_wu as to_veitschegger_wu,
+)
+from ._cooperating import (
+    Cooperation as Cooperation,
+    SlaveMotion as SlaveMotion,
+    led_motion as led_motion,
+    loop_error as loop_error,
+    slave_motion as slave_motion,
+    slave_pose as slave_pose,
 )
 from ._damping import (
     AbstractDamping as AbstractDamping,
@@ -134,6 +157,20 @@ from ._link_conventions import (
     ModifiedDHJoints as ModifiedDHJoints,
     VeitscheggerWuJoints as VeitscheggerWuJoints,
 )
+from ._logarithm import (
+    displacement as displacement,
+    twist_from_transform as twist_from_transform,
+    vector_from_rotation as vector_from_rotation,
+)
+from ._manipulability import (
+    Ellipsoid as Ellipsoid,
+    condition_number as condition_number,
+    directional_reach as directional_reach,
+    inverse_condition_number as inverse_condition_number,
+    manipulability as manipulability,
+    scaled_jacobian as scaled_jacobian,
+    velocity_ellipsoid as velocity_ellipsoid,
+)
 from ._minimal import (
     MinimalModel as MinimalModel,
     minimal_model as minimal_model,
@@ -152,6 +189,17 @@ from ._motion_limits import (
     MotionLimits as MotionLimits,
     check_motion as check_motion,
     motion_margins as motion_margins,
+)
+from ._orientation import (
+    abc_from_rotation as abc_from_rotation,
+    check_rotation as check_rotation,
+    check_transform as check_transform,
+    rotation_from_abc as rotation_from_abc,
+    rotation_from_zxz as rotation_from_zxz,
+    rpy_from_rotation as rpy_from_rotation,
+    rpy_solutions as rpy_solutions,
+    zxz_from_rotation as zxz_from_rotation,
+    zxz_solutions as zxz_solutions,
 )
 from ._parameters import (
     ChainParameters as ChainParameters,
@@ -176,6 +224,17 @@ from ._posture import (
     Posture as Posture,
     branch_index as branch_index,
     posture_of as posture_of,
+)
+from ._quaternion import (
+    continuous_quaternions as continuous_quaternions,
+    quaternion_from_rotation as quaternion_from_rotation,
+    quaternion_product as quaternion_product,
+    rotation_from_quaternion as rotation_from_quaternion,
+)
+from ._reach import (
+    ReachLimits as ReachLimits,
+    extent as extent,
+    reach_limits as reach_limits,
 )
 from ._redundancy import (
     hard_and_soft as hard_and_soft,
@@ -207,6 +266,18 @@ from ._singularities import (
     drive_singularity as drive_singularity,
     parameter_singularity as parameter_singularity,
 )
+from ._statics import (
+    WrenchEstimate as WrenchEstimate,
+    generalised_wrench as generalised_wrench,
+    joint_torques as joint_torques,
+    tool_compliance as tool_compliance,
+    tool_stiffness as tool_stiffness,
+    wrench_about as wrench_about,
+    wrench_from_generalised as wrench_from_generalised,
+    wrench_from_joint_torques as wrench_from_joint_torques,
+    wrench_to_base as wrench_to_base,
+    wrench_to_tool as wrench_to_tool,
+)
 from ._structured import (
     SAME as SAME,
     JointStructure as JointStructure,
@@ -222,5 +293,28 @@ from ._taylor_expansion import (
     taylor_majorant as taylor_majorant,
     taylor_polynomials as taylor_polynomials,
     taylor_remainder as taylor_remainder,
+)
+from ._uncertainty import (
+    Quantisation as Quantisation,
+    explicit_sensitivity as explicit_sensitivity,
+    implicit_sensitivity as implicit_sensitivity,
+    propagated_covariance as propagated_covariance,
+    quantisation as quantisation,
+    tool_covariance as tool_covariance,
+    tool_deviation as tool_deviation,
+    tool_sensitivity as tool_sensitivity,
+    tool_worst_case as tool_worst_case,
+    worst_case as worst_case,
+)
+from ._workspace import (
+    PoseQuality as PoseQuality,
+    SampledSection as SampledSection,
+    joint_grid as joint_grid,
+    pose_quality as pose_quality,
+    random_joints as random_joints,
+    reachable_points as reachable_points,
+    sampled_section as sampled_section,
+    section_map as section_map,
+    section_points as section_points,
 )
 from ._wrist_weights import WristWeights as WristWeights
