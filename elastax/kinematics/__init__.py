@@ -1,6 +1,20 @@
 """Homogeneous transforms, serial chains, Jacobians and inverse kinematics."""
 
 from ._arm import Arm as Arm
+from ._calibration import (
+    Calibration as Calibration,
+    Estimate as Estimate,
+    NoiseVariance as NoiseVariance,
+    calibrate as calibrate,
+    estimate_parameters as estimate_parameters,
+)
+from ._calibration_problem import (
+    RELIABLE_CONDITION as RELIABLE_CONDITION,
+    CalibrationProblem as CalibrationProblem,
+    GaussianPrior as GaussianPrior,
+    Identifiability as Identifiability,
+    identifiability as identifiability,
+)
 from ._chain import (
     MovingFrames as MovingFrames,
     SerialChain as SerialChain,
@@ -61,10 +75,40 @@ from ._link_conventions import (
     ModifiedDHJoints as ModifiedDHJoints,
     VeitscheggerWuJoints as VeitscheggerWuJoints,
 )
+from ._measurements import (
+    AbstractInstrument as AbstractInstrument,
+    DistanceInstrument as DistanceInstrument,
+    Measurements as Measurements,
+    PointInstrument as PointInstrument,
+    PoseInstrument as PoseInstrument,
+)
+from ._observability import (
+    AbstractObservability as AbstractObservability,
+    InverseConditionIndex as InverseConditionIndex,
+    MeanVarianceIndex as MeanVarianceIndex,
+    NoiseAmplificationIndex as NoiseAmplificationIndex,
+    ProductIndex as ProductIndex,
+    ReciprocalSumIndex as ReciprocalSumIndex,
+    SmallestSingularValueIndex as SmallestSingularValueIndex,
+    observability as observability,
+    reading_jacobian as reading_jacobian,
+)
 from ._parameters import (
     ChainParameters as ChainParameters,
     Parameter as Parameter,
     parameter_jacobian as parameter_jacobian,
+)
+from ._pose_selection import (
+    PoseSelection as PoseSelection,
+    random_poses as random_poses,
+    select_poses as select_poses,
+)
+from ._registration import (
+    PointFit as PointFit,
+    RotationFit as RotationFit,
+    fit_points as fit_points,
+    mean_rotation as mean_rotation,
+    nearest_rotation as nearest_rotation,
 )
 from ._se3 import (
     inverse_transform as inverse_transform,
@@ -84,4 +128,13 @@ from ._structured import (
     placement as placement,
     placements as placements,
     structured as structured,
+)
+from ._tool_pose import (
+    Mounting as Mounting,
+    ToolCentre as ToolCentre,
+    frame_from_points as frame_from_points,
+    mounting_pose as mounting_pose,
+    tool_centre_point as tool_centre_point,
+    tool_frame as tool_frame,
+    tool_orientation as tool_orientation,
 )

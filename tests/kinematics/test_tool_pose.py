@@ -1,0 +1,245 @@
+"""Tool centre point, tool frame and mounting pose: exact, with noise, degenerate."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from elastax.kinematics import (
+    CalibrationProblem,
+    ChainParameters,
+    Measurements,
+    PointInstrument,
+    PoseInstrument,
+    estimate_parameters,
+    fit_points,
+    forward_kinematics,
+    frame_from_points,
+    inverse_transform,
+    mean_rotation,
+    mounting_pose,
+    nearest_rotation,
+    rotation_from_vector,
+    rotation_x,
+    rotation_z,
+    tool_centre_point,
+    tool_frame,
+    tool_orientation,
+    transform,
+    transform_from_twist,
+)
+
+from ..helpers import assert_close, assert_gradient
+from .calibration_arms import REFLECTORS, TOOL, heavy, poses
+
+
+TIP = jnp.array([0.08, -0.03, 0.21])
+POINT = jnp.array([1.4, 0.3, 0.9])
+
+
+def touching(vectors, tip=TIP, point=POINT):
+    """Flange poses turned by `vectors` [rad] whose `tip` touches `point`."""
+    rotations = jax.vmap(rotation_from_vector)(jnp.asarray(vectors))
+    positions = point[None] - rotations @ tip
+    return transform(rotations, positions)
+
+
+FOUR = np.array([[0.1, 0, 0], [0.9, 0.2, 0], [-0.3, 0.8, 0.4], [0, -0.7, 1.0]])
+
+
+# ------------------------------------------------------------------- tool centre point
+
+
+def test_four_points_give_the_tool_centre():
+    found = tool_centre_point(touching(FOUR))
+    assert_close(found.position, TIP, rtol=0, atol=1e-14)
+    assert_close(found.point, POINT, rtol=0, atol=1e-14)
+    assert_close(found.residuals, np.zeros((4, 3)), rtol=0, atol=1e-14)
+
+
+def test_tool_centre_is_the_least_squares_solution():
+    noise = 1e-4 * np.random.default_rng(0).standard_normal((4, 3))
+    poses = touching(FOUR).at[:, :3, 3].add(noise)
+    found = tool_centre_point(poses, deviation=1e-4)
+    design = np.concatenate(
+        [np.hstack([pose[:3, :3], -np.eye(3)]) for pose in np.asarray(poses)]
+    )
+    both = np.linalg.lstsq(design, -np.asarray(poses[:, :3, 3]).reshape(-1))[0]
+    assert_close(found.position, both[:3], rtol=0, atol=1e-14)
+    assert_close(found.point, both[3:], rtol=0, atol=1e-14)
+    covariance = 1e-8 * np.linalg.inv(design.T @ design)
+    assert_close(found.covariance, covariance, rtol=1e-10)
+    estimated = tool_centre_point(poses)
+    rest = both @ design.T + np.asarray(poses[:, :3, 3]).reshape(-1)
+    assert_close(estimated.covariance, covariance * 1e8 * (rest @ rest) / 6, rtol=1e-9)
+
+
+def test_uncertainty_of_the_tool_centre():
+    def run(key):
+        noise = 1e-4 * jax.random.normal(key, (4, 3))
+        return tool_centre_point(touching(FOUR).at[:, :3, 3].add(noise), deviation=1e-4)
+
+    found = jax.jit(jax.vmap(run))(jax.random.split(jax.random.key(0), 2000))
+    error = np.asarray(found.position - TIP[None])
+    # entries of a covariance from 2000 samples scatter by 3 %
+    expected = np.asarray(found.covariance[0])[:3, :3]
+    size = np.sqrt(np.diag(expected))
+    assert_close(np.cov(error.T) / np.outer(size, size), expected / np.outer(size, size),
+                 rtol=0, atol=0.12)  # fmt: skip
+    deviation = jax.vmap(lambda f: f.standard_deviation())(found)[0]
+    assert_close(deviation, size, rtol=1e-12)
+
+
+def test_tool_centre_gradient():
+    assert_gradient(lambda p: tool_centre_point(p).position, touching(FOUR))
+
+
+def test_degenerate_touches_are_refused():
+    with pytest.raises(ValueError, match="different orientations, but have one"):
+        tool_centre_point(touching(np.zeros((4, 3))))
+    about_z = np.array([[0.0, 0, 0], [0, 0, 1], [0, 0, -1], [0, 0, 2]])
+    with pytest.raises(ValueError, match="turned about one"):
+        tool_centre_point(touching(about_z))
+    with pytest.raises(ValueError, match="three poses at least"):
+        tool_centre_point(touching(FOUR[:2]))
+    run = jax.jit(lambda p: tool_centre_point(p).position)
+    with pytest.raises(Exception, match="different orientations"):
+        jax.block_until_ready(run(touching(np.zeros((4, 3)))))
+
+
+# ------------------------------------------------------------------------- orientation
+
+
+def test_frame_from_points():
+    frame = transform_from_twist(jnp.array([0.3, -0.2, 0.5, 0.4, 1.0, -0.8]))
+    point = lambda *x: (frame @ jnp.array([*x, 1.0]))[:3]
+    found = frame_from_points(point(0.0, 0, 0), point(0.4, 0, 0), point(-0.2, 0.3, 0))
+    assert_close(found, frame, rtol=0, atol=1e-14)
+    with pytest.raises(ValueError, match="`on_x` must not coincide"):
+        frame_from_points(POINT, POINT, TIP)
+    with pytest.raises(ValueError, match="`in_xy` must not lie on the line"):
+        frame_from_points(point(0.0, 0, 0), point(0.4, 0, 0), point(-0.2, 0, 0))
+
+
+def test_tool_frame_from_three_touches():
+    tips = jnp.array([[0.0, 0, 0], [0.1, 0, 0], [0.05, 0.2, 0]])
+    in_flange = tips @ TOOL[:3, :3].T + TOOL[None, :3, 3]
+    flange = jnp.stack([touching(FOUR[k : k + 1], in_flange[k])[0] for k in range(3)])
+    assert_close(tool_frame(flange, POINT), TOOL, rtol=0, atol=1e-14)
+
+
+def test_tool_orientation_and_its_spread():
+    flange = jax.vmap(rotation_from_vector)(jnp.asarray(FOUR))
+    noise = jnp.asarray(1e-3 * np.random.default_rng(1).standard_normal((4, 3)))
+    exact = TOOL[:3, :3]
+    tool = jax.vmap(lambda r, n: r @ rotation_from_vector(n) @ exact)(flange, noise)
+    found = tool_orientation(flange, tool)
+    # small rotations: the mean of their vectors, products of 1e-6 left out
+    mean = jnp.mean(noise, axis=0)
+    assert_close(found.rotation, rotation_from_vector(mean) @ exact, rtol=0, atol=3e-6)
+    rest = np.asarray(noise - mean[None])
+    assert_close(found.residuals, rest, rtol=0, atol=3e-6)
+    spread = np.sqrt(np.sum(rest**2, axis=0) / 12)
+    assert_close(found.standard_deviation(), spread, rtol=0.01)
+
+
+def test_rotations_without_a_mean():
+    about = jax.vmap(rotation_z)(jnp.array([0.0, np.pi / 2, np.pi, -np.pi / 2]))
+    with pytest.raises(ValueError, match="point all over"):
+        mean_rotation(jnp.concatenate([about, about @ rotation_x(jnp.array(np.pi))]))
+    with pytest.raises(ValueError, match="two at least, but hold 1"):
+        mean_rotation(about[:1])
+
+
+# -------------------------------------------------------------------------- registration
+
+
+@pytest.mark.parametrize(
+    "points",
+    (REFLECTORS, np.eye(3), np.vstack([np.eye(3), -np.eye(3)]), poses(20)[:, :3]),
+    ids=("three", "regular", "cube", "cloud"),
+)
+def test_fit_of_exact_points(points):
+    pose = transform_from_twist(jnp.array([1.0, -2, 0.5, 2.0, 1.0, -1.8]))
+    measured = points @ pose[:3, :3].T + pose[None, :3, 3]
+    found = fit_points(jnp.asarray(points), measured)
+    assert_close(found.pose, pose, rtol=0, atol=1e-13)
+    assert_close(found.residuals, np.zeros(points.shape), rtol=0, atol=1e-13)
+
+
+def test_fit_is_never_a_reflection():
+    """Points of a plane whose mirror image would fit as well, and noise beyond it."""
+    points = jnp.asarray(np.array([[0.0, 0, 1e-4], [1, 0, 0], [0, 1, 0], [1, 1, 0]]))
+    mirrored = points * jnp.array([1.0, 1.0, -1.0])[None]
+    assert_close(jnp.linalg.det(fit_points(points, mirrored).pose), 1.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("matrix", ("general", "equal", "flat"))
+def test_nearest_rotation_gradient(matrix):
+    """Equal singular values, or a zero one, leave the rotation unique and smooth."""
+    rotation = rotation_from_vector(jnp.array([0.4, -1.0, 0.3]))
+    stretch = {"general": [3.0, 2, 1], "equal": [2.0, 2, 2], "flat": [2.0, 1, 0]}
+    base = rotation @ jnp.diag(jnp.array(stretch[matrix]))
+    assert_close(nearest_rotation(base), rotation, rtol=0, atol=1e-14)
+    # moved in a skew direction, so that differences see a plane that does not flip
+    path = lambda x: nearest_rotation(
+        base + (x[0] - 1) * jnp.array([[0.0, 1, 2], [-1, 0, 0.5], [-2, -0.5, 0]])
+    )
+    assert_gradient(path, jnp.ones(1))
+
+
+def test_points_on_a_line_are_refused():
+    line = jnp.asarray(np.outer(np.arange(4.0), [1.0, 2, 3]))
+    with pytest.raises(ValueError, match="must not lie on one line"):
+        fit_points(line, line)
+    with pytest.raises(ValueError, match="same three points"):
+        fit_points(line[:2], line[:2])
+    with pytest.raises(Exception, match="must not lie on one line"):
+        jax.block_until_ready(jax.jit(lambda x: fit_points(x, x).pose)(line))
+
+
+# ------------------------------------------------------------------------ mounting pose
+
+
+def test_mounting_pose():
+    pose = transform_from_twist(jnp.array([3.0, -1, 0.4, 0.3, -2.0, 1.0]))
+    arm = heavy()
+    placed = type(arm)(arm.joints, pose, arm.tool, arm.kinds)
+    instrument = PointInstrument(5e-5, REFLECTORS)
+    exact = Measurements.simulated(instrument, placed, poses(6))
+    found = mounting_pose(arm, exact)
+    assert_close(found.pose, pose, rtol=0, atol=1e-11)
+    noisy = Measurements.simulated(instrument, placed, poses(6), jax.random.key(0))
+    found = mounting_pose(arm, noisy)
+    # equal deviations everywhere: closed form and refinement minimise the same sum
+    assert_close(found.pose, found.fit.pose, rtol=0, atol=1e-10)
+    error = inverse_transform(pose) @ found.pose
+    size = found.estimate.standard_deviation()
+    assert np.all(np.abs(error[:3, 3]) < 4 * size[:3])
+    assert np.all(size < 5e-5)
+    # unequal ones: the refinement is the better fit
+    uneven = PointInstrument([1e-5, 1e-5, 1e-3], REFLECTORS)
+    noisy = Measurements.simulated(uneven, placed, poses(6), jax.random.key(0))
+    found = mounting_pose(arm, noisy)
+    first = CalibrationProblem(found.estimate.problem.parameters, noisy)
+    start = first.residuals(first.zero(), first.whitening())
+    assert np.sum(start**2) > 2 * found.estimate.chi_square()
+
+
+def test_mounting_pose_is_a_calibration_of_the_base():
+    arm = heavy()
+    measured = Measurements.simulated(
+        PointInstrument(5e-5, REFLECTORS), arm, poses(6), jax.random.key(3)
+    )
+    found = mounting_pose(arm, measured)
+    names = [f"base_{c}" for c in ("x", "y", "z", "rx", "ry", "rz")]
+    base = ChainParameters.of(arm).select(names)
+    direct = estimate_parameters(CalibrationProblem(base, measured))
+    assert_close(found.pose, direct.chain().base, rtol=0, atol=1e-10)
+    q = poses(1, seed=5)[0]
+    assert np.max(np.abs(forward_kinematics(direct.chain(), q) - forward_kinematics(arm, q))) < 2e-4  # fmt: skip  # noqa: E501
+
+
+def test_mounting_needs_points():
+    measured = Measurements.simulated(PoseInstrument(1e-4, 1e-4), heavy(), poses(3))
+    with pytest.raises(TypeError, match="PointInstrument, but are those of a PoseIns"):
+        mounting_pose(heavy(), measured)
