@@ -73,12 +73,12 @@ class Estimate(eqx.Module):
 
     def standard_deviation(self) -> Vector:
         """Of each parameter [m] or [rad]."""
-        return jnp.sqrt(jnp.diagonal(self.covariance, axis1=-2, axis2=-1))
+        return jnp.sqrt(jnp.diagonal(self.covariance))
 
     def correlation(self) -> Float[Array, "parameters parameters"]:
         """Correlation matrix of the parameters."""
         size = self.standard_deviation()
-        return self.covariance / (size[..., :, None] * size[..., None, :])
+        return self.covariance / (size[:, None] * size[None, :])
 
     def half_width(self, level: float = 0.95) -> Vector:
         """Half the interval that covers a true deviation with probability `level`."""
@@ -91,12 +91,12 @@ class Estimate(eqx.Module):
 
     def chi_square(self) -> Scalar:
         """Sum of the squared weighted residuals."""
-        return jnp.sum(self.residuals**2, axis=-1)
+        return jnp.sum(self.residuals**2)
 
     @property
     def degrees_of_freedom(self) -> int:
         """Readings less parameters; the mean of `chi_square` if the model is right."""
-        return self.residuals.shape[-1] - self.deviation.shape[-1]
+        return self.residuals.shape[0] - self.deviation.shape[0]
 
     def probability(self) -> float:
         """Probability of a larger `chi_square`, if arm and deviations are right.
@@ -355,6 +355,9 @@ def _spread(
     lost = jnp.abs(diagonal) < tiny
     upper = upper + jnp.diag(jnp.where(lost, tiny - diagonal, 0.0))
     identity = jnp.eye(upper.shape[0], dtype=upper.dtype)
-    root = jsl.solve_triangular(upper, identity) / lengths[:, None]
-    values = jnp.linalg.svd(scaled, compute_uv=False)
-    return root @ root.T, values[0] / jnp.maximum(values[-1], tiny)
+    root = jsl.solve_triangular(upper, identity)
+    # Singular values of the inverse, not of the columns: batched LAPACK calls that do
+    # not wait for one another can block each other for ever on a processor.
+    values = jnp.linalg.svd(root, compute_uv=False)
+    root = root / lengths[:, None]
+    return root @ root.T, values[0] / values[-1]

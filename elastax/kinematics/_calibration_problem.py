@@ -13,12 +13,12 @@ from .._custom_types import PerJoint, as_optional_real, as_real, require_float64
 from ._chain import SerialChain
 from ._dependence import Dependence, dependent_columns
 from ._joints import JointKind
-from ._measurements import Measurements
+from ._measurements import Measurements, Whitening
 from ._parameters import ChainParameters, Vector
 
 
 Rows = Float[Array, " rows"]
-Whitening = tuple[Float[Array, "poses rows rows"] | None, ...]
+Whitenings = tuple[Whitening | None, ...]
 
 # Schroer's bound, quoted in [Nahvi1996]: beyond it estimates are not reliable
 RELIABLE_CONDITION = 100.0
@@ -145,11 +145,11 @@ class CalibrationProblem(eqx.Module):
         zero = jnp.zeros((self.parameters.chain.number,), x.dtype)
         return zero.at[np.array(self.encoders)].set(x[self.parameters.number :])
 
-    def whitening(self) -> Whitening:
+    def whitening(self) -> Whitenings:
         """What `residuals` needs to take encoder noise into account."""
         return tuple(m.whitening(self.parameters.chain) for m in self.measurements)
 
-    def residuals(self, x: Vector, whitening: Whitening) -> Rows:
+    def residuals(self, x: Vector, whitening: Whitenings) -> Rows:
         """Readings minus predictions over their deviations, then those of the prior."""
         chain, offset = self.chain(x), self.offset(x)
         parts = [
@@ -164,7 +164,7 @@ class CalibrationProblem(eqx.Module):
         return jnp.concatenate(parts)
 
     def jacobian(
-        self, x: Vector, whitening: Whitening
+        self, x: Vector, whitening: Whitenings
     ) -> Float[Array, "rows parameters"]:
         """Derivative of the residuals by the unknowns.
 

@@ -1,4 +1,4 @@
-"""Joint conventions behind Denavit and Hartenberg's, and chains that mix conventions."""
+"""Joint conventions besides Denavit and Hartenberg's, and chains that mix them."""
 
 import equinox as eqx
 import jax

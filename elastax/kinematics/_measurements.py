@@ -5,7 +5,6 @@ import abc
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import jax.scipy.linalg as jsl
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -17,6 +16,7 @@ from ._se3 import rotation_error, transform
 
 
 Channels = Float[Array, " channels"]
+Whitening = Float[Array, "poses channels channels"]
 
 
 class AbstractInstrument(eqx.Module):
@@ -234,7 +234,9 @@ class Measurements(eqx.Module):
             readings = jax.vmap(instrument.disturbed)(readings, noise)
         return Measurements(instrument, q, readings, joint_deviation)
 
-    def whitening(self, chain: SerialChain) -> Float[Array, "poses rows rows"] | None:
+    def whitening(
+        self, chain: SerialChain
+    ) -> Float[Array, "poses channels channels"] | None:
         r"""Matrices that make the residuals of each pose uncorrelated, of variance one.
 
         Encoder noise adds $J_q S_q J_q^T$ to the covariance of a residual; without it
@@ -251,8 +253,7 @@ class Measurements(eqx.Module):
             slope = jax.jacfwd(lambda x: self.instrument.residual(chain, x, reading))(q)
             spread = slope * self.joint_deviation[None]
             identity = jnp.eye(slope.shape[0], dtype=slope.dtype)
-            lower = jnp.linalg.cholesky(identity + spread @ spread.T)
-            return jsl.solve_triangular(lower, identity, lower=True)
+            return _inverse_root(identity + spread @ spread.T)
 
         return jax.vmap(factor)(self.q)
 
@@ -260,7 +261,7 @@ class Measurements(eqx.Module):
         self,
         chain: SerialChain,
         offset: PerJoint | None = None,
-        whitening: Float[Array, "poses rows rows"] | None = None,
+        whitening: Whitening | None = None,
     ) -> Float[Array, " rows"]:
         """Weighted residuals of all poses behind one another.
 
@@ -276,6 +277,25 @@ class Measurements(eqx.Module):
         if whitening is not None:
             rows = jnp.einsum("kij,kj->ki", whitening, rows)
         return rows.reshape(-1)
+
+
+def _inverse_root(matrix: Float[Array, "n n"]) -> Float[Array, "n n"]:
+    """W with W S W^T = I of a positive definite S: Cholesky's elimination beside I.
+
+    Small and in plain operations, because the whitenings of several instruments do not
+    wait for one another, and batched LAPACK calls then block each other on a processor.
+    """
+    number = matrix.shape[0]
+
+    def eliminate(k, both):
+        row = both[k] / jnp.sqrt(both[k, k])
+        below = jnp.where(
+            jnp.arange(number) > k, both[:, k] / jnp.sqrt(both[k, k]), 0.0
+        )
+        return (both - below[:, None] * row[None]).at[k].set(row)
+
+    both = jnp.concatenate([matrix, jnp.eye(number, dtype=matrix.dtype)], axis=1)
+    return jax.lax.fori_loop(0, number, eliminate, both)[:, number:]
 
 
 def _three(value) -> Float[Array, "3"]:

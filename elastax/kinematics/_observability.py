@@ -147,15 +147,17 @@ def observability(
     Raises:
         ValueError: fewer readings than parameters.
     """
-    rows = jax.vmap(
-        lambda x: reading_jacobian(parameters, instrument, x, characteristic_length)
-    )(q)
-    matrix = rows.reshape(-1, parameters.number)
-    if matrix.shape[0] < matrix.shape[1]:
+    jacobian = lambda x: reading_jacobian(
+        parameters, instrument, x, characteristic_length
+    )
+    channels, number = jax.eval_shape(jacobian, q[0]).shape
+    readings = q.shape[0] * channels
+    if readings < number:
         raise ValueError(
-            f"{matrix.shape[1]} parameters need as many readings at least, but "
-            f"{q.shape[0]} poses give {matrix.shape[0]}"
+            f"{number} parameters need as many readings at least, but {q.shape[0]} "
+            f"poses give {readings}"
         )
+    matrix = jax.vmap(jacobian)(q).reshape(readings, number)
     return index.index(jnp.linalg.svd(matrix, compute_uv=False), q.shape[0])
 
 

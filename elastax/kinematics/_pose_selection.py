@@ -99,10 +99,12 @@ def select_poses(
     """
     require_float64("a choice of poses")
     count = candidates.shape[0]
-    rows = jax.vmap(
-        lambda q: reading_jacobian(parameters, instrument, q, characteristic_length)
-    )(candidates)
-    _check_number(number, count, rows.shape[1], parameters.number)
+    jacobian = lambda q: reading_jacobian(
+        parameters, instrument, q, characteristic_length
+    )
+    channels, _ = jax.eval_shape(jacobian, candidates[0]).shape
+    _check_number(number, count, channels, parameters.number)
+    rows = jax.vmap(jacobian)(candidates)
     information = jnp.einsum("kia,kib->kab", rows, rows)
     information = _determined(information)
     informed = lambda weight: jnp.einsum("k,kab->ab", weight, information)

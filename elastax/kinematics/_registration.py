@@ -55,9 +55,14 @@ def nearest_rotation(matrix: Matrix3) -> Matrix3:
         [Kabsch1976].
     """
     left, _, right = jnp.linalg.svd(matrix)
-    sign = jnp.linalg.det(left) * jnp.linalg.det(right)
+    sign = _handedness(left) * _handedness(right)
     last = jnp.stack([jnp.ones_like(sign), jnp.ones_like(sign), sign])
     return (left * last[None]) @ right
+
+
+def _handedness(matrix: Matrix3) -> Scalar:
+    """Determinant of an orthogonal matrix, without a LAPACK call."""
+    return jnp.cross(matrix[0], matrix[1]) @ matrix[2]
 
 
 @nearest_rotation.defjvp

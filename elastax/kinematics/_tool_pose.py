@@ -101,18 +101,26 @@ def tool_centre_point(
         "the coordinate of the tool centre point along it is not determined",
     )
     shift = position - jnp.mean(position, axis=0)[None]
-    upper_q, upper = jnp.linalg.qr(stacked)
-    tool = jsl.solve_triangular(upper, -upper_q.T @ shift.reshape(-1))
+    basis, upper = jnp.linalg.qr(stacked)
+    # one solution for the tool and for the inverse, of which the covariance is made
+    identity = jnp.eye(3, dtype=upper.dtype)
+    right = jnp.concatenate([-(basis.T @ shift.reshape(-1))[:, None], identity], axis=1)
+    solved = jsl.solve_triangular(upper, right)
+    tool, root = solved[:, 0], solved[:, 1:]
     tips = jnp.einsum("kij,j->ki", rotation, tool) + position
     point = jnp.mean(tips, axis=0)
     residuals = point[None] - tips
-    identity = jnp.broadcast_to(jnp.eye(3, dtype=tool.dtype), rotation.shape)
-    design = jnp.concatenate([rotation, -identity], axis=-1).reshape(-1, 6)
     if deviation is None:
         variance = jnp.sum(residuals**2) / (3 * number - 6)
     else:
         variance = jnp.asarray(deviation, tool.dtype) ** 2
-    covariance = variance * jnp.linalg.inv(design.T @ design)
+    # c = mean(R) t + mean(p), whose parts are independent
+    turned = jnp.mean(rotation, axis=0)
+    own = root @ root.T
+    cross = own @ turned.T
+    covariance = variance * jnp.block(
+        [[own, cross], [cross.T, turned @ cross + identity / number]]
+    )
     return ToolCentre(tool, point, covariance, residuals)
 
 
@@ -200,10 +208,10 @@ def mounting_pose(
     noise: NoiseVariance = NoiseVariance.GIVEN,
     smallest_spread: float = 1e-3,
 ) -> Mounting:
-    """Pose of the arm in the frame of a measuring system that reads points on the tool.
+    """Pose of an arm in the frame of a measuring system that reads points on the tool.
 
-    The closed form needs no start and weighs all readings alike. From there the weighted
-    readings are fitted, which also gives the uncertainty.
+    The closed form needs no start and weighs all readings alike. From there the
+    weighted readings are fitted, which also gives the uncertainty.
 
     Args:
         chain: the arm; its base pose may be anything.

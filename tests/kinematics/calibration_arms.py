@@ -50,8 +50,8 @@ def light() -> SerialChain:
 
 def poses(number: int, seed: int = 0):
     """Joint coordinates [rad] within the limits of the heavy arm."""
-    upper = np.array([2.0, 2.2, 1.2, 2.5, 2.0, 2.5])
-    lower = np.array([-2.0, 0.3, -1.2, -2.5, -2.0, -2.5])
+    upper = jnp.array([2.0, 2.2, 1.2, 2.5, 2.0, 2.5])
+    lower = jnp.array([-2.0, 0.3, -1.2, -2.5, -2.0, -2.5])
     return random_poses(lower, upper, number, key=jax.random.key(seed))
 
 

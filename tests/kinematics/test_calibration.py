@@ -25,17 +25,11 @@ from elastax.kinematics import (
 from ..helpers import assert_close, assert_gradient
 from .arms import planar
 from .calibration_arms import (
-    REFLECTORS,
     deviations,
     heavy,
     heavy_hayati,
-    light,
     poses,
 )
-
-
-SEEDS = 200
-ENCODERS = np.full(6, 1e-5)
 
 
 def problem_of(chain, instrument, q, names=None, joint_deviation=None, **options):
@@ -62,57 +56,6 @@ def true_problem(problem, x, key=None):
 
 def reduced(problem):
     return problem.select(identifiability(problem).identifiable)
-
-
-# ------------------------------------------------------------- coverage of the intervals
-
-CASES = {
-    "heavy arm, three reflectors, encoder noise": (
-        heavy,
-        PointInstrument(5e-5, REFLECTORS),
-        ENCODERS,
-        NoiseVariance.GIVEN,
-    ),
-    "light arm, full poses, variance estimated": (
-        light,
-        PoseInstrument(5e-5, 1e-4),
-        None,
-        NoiseVariance.ESTIMATED,
-    ),
-}
-
-
-@pytest.mark.parametrize("case", CASES, ids=str)
-def test_intervals_cover_the_true_values(case):
-    arm, instrument, encoders, noise = CASES[case]
-    problem = reduced(problem_of(arm(), instrument, poses(30), None, encoders))
-    true = deviations(problem.units)
-
-    def run(key):
-        problem_now = true_problem(problem, true, key)
-        return estimate_parameters(problem_now, noise=noise, throw=False)
-
-    keys = jax.random.split(jax.random.key(7), SEEDS)
-    estimates = jax.jit(jax.vmap(run))(keys)
-    assert np.all(estimates.result == optx.RESULTS.successful)
-    error = estimates.deviation - true[None]
-    inside = np.abs(error) < estimates.half_width(0.95)
-    # 200 data sets with some 28 parameters that are correlated among themselves: the
-    # share scatters by 0.5 % about 95 %
-    assert 0.93 < np.mean(inside) < 0.97
-    # the covariance is that of the scatter: a variance from 200 samples is uncertain by
-    # 10 %, the mean over the parameters by less
-    scaled = error / estimates.standard_deviation()
-    assert abs(np.mean(scaled**2) - 1.0) < 0.1
-    # the mean of chi-square is the number of degrees of freedom, with the deviation of
-    # a mean of 200
-    freedom = estimates.degrees_of_freedom
-    assert freedom == problem.rows - problem.number
-    scatter = np.sqrt(2 * freedom / SEEDS)
-    assert abs(np.mean(estimates.chi_square()) - freedom) < 4 * scatter
-
-
-# --------------------------------------------------------------------- exact and routes
 
 
 @pytest.fixture(scope="module")
@@ -287,7 +230,7 @@ def test_distances_determine_the_arm():
     assert_close(found.deviation, true, rtol=0, atol=1e-10)
 
 
-# --------------------------------------------------------------------- reports, refusals
+# ---------------------------------------------------------------- reports, refusals
 
 
 def test_wrong_deviations_show_in_the_probability(pose_problem):

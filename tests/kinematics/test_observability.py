@@ -67,7 +67,8 @@ def test_reading_jacobian_of_a_planar_arm():
     chain = planar(1.0, 0.7)
     parameters = ChainParameters.of(chain).select(("a_2", "theta_2"))
     q, sigma = jnp.array([0.3, 0.5]), 1e-4
-    found = reading_jacobian(parameters, PointInstrument(sigma), q, 0.5)
+    instrument = PointInstrument(sigma)
+    found = jax.jit(lambda q: reading_jacobian(parameters, instrument, q, 0.5))(q)
     c, s = np.cos(0.8), np.sin(0.8)
     expected = np.array([[0.5 * c, -0.7 * s], [0.5 * s, 0.7 * c], [0, 0]]) / sigma
     # rounding over 1e-4
@@ -76,33 +77,31 @@ def test_reading_jacobian_of_a_planar_arm():
 
 def test_index_of_an_experiment():
     parameters = ChainParameters.of(heavy()).select(("a_2", "theta_3", "d_4"))
-    instrument, q = PointInstrument(5e-5), poses(6)
+    q = poses(6)
 
     def place(x, q):
         return forward_kinematics(parameters.moved(x), q)[:3, 3]
 
-    slopes = jax.vmap(lambda q: jax.jacfwd(place)(jnp.zeros(3), q))(q)
+    @jax.jit
+    def indices(q, deviation):
+        instrument = PointInstrument(deviation)
+        return [observability(i, parameters, instrument, q) for i in INDICES]
+
+    slopes = jax.jit(jax.vmap(lambda q: jax.jacfwd(place)(jnp.zeros(3), q)))(q)
     sigma = np.linalg.svd(np.asarray(slopes).reshape(-1, 3) / 5e-5, compute_uv=False)
-    values = {
-        type(index): float(observability(index, parameters, instrument, q))
-        for index in INDICES
-    }
+    kinds = [type(index) for index in INDICES]
+    values = dict(zip(kinds, indices(q, 5e-5), strict=True))
     assert_close(values[ProductIndex], np.prod(sigma) ** (1 / 3) / 6**0.5, rtol=1e-12)
     assert_close(values[SmallestSingularValueIndex], sigma[-1], rtol=1e-12)
-    # twice the noise, half the index
-    doubled = observability(
-        SmallestSingularValueIndex(), parameters, PointInstrument(1e-4), q
-    )
-    assert_close(doubled, sigma[-1] / 2, rtol=1e-12)
-    # more readings of the same poses: all but O1 and O2 grow as the root
-    twice = jnp.concatenate([q, q])
-    more = {
-        type(index): float(observability(index, parameters, instrument, twice))
-        for index in INDICES
-    }
+    # twice the noise, half the index, but for the ratio
+    doubled = dict(zip(kinds, indices(q, 1e-4), strict=True))
+    # each pose twice: all but O1 and O2 grow as the root of two
+    twice = dict(zip(kinds, indices(jnp.concatenate([q, q]), 5e-5), strict=True))
     for kind, value in values.items():
+        halved = 1.0 if kind is InverseConditionIndex else 0.5
+        assert_close(doubled[kind], value * halved, rtol=1e-12)
         same = kind in (ProductIndex, InverseConditionIndex)
-        assert_close(more[kind], value * (1 if same else 2**0.5), rtol=1e-12)
+        assert_close(twice[kind], value * (1 if same else 2**0.5), rtol=1e-12)
 
 
 def test_too_few_readings():

@@ -83,8 +83,8 @@ def test_uncertainty_of_the_tool_centre():
     # entries of a covariance from 2000 samples scatter by 3 %
     expected = np.asarray(found.covariance[0])[:3, :3]
     size = np.sqrt(np.diag(expected))
-    assert_close(np.cov(error.T) / np.outer(size, size), expected / np.outer(size, size),
-                 rtol=0, atol=0.12)  # fmt: skip
+    unit = np.outer(size, size)
+    assert_close(np.cov(error.T) / unit, expected / unit, rtol=0, atol=0.12)
     deviation = jax.vmap(lambda f: f.standard_deviation())(found)[0]
     assert_close(deviation, size, rtol=1e-12)
 
@@ -150,7 +150,7 @@ def test_rotations_without_a_mean():
         mean_rotation(about[:1])
 
 
-# -------------------------------------------------------------------------- registration
+# -------------------------------------------------------------------- registration
 
 
 @pytest.mark.parametrize(
@@ -236,7 +236,8 @@ def test_mounting_pose_is_a_calibration_of_the_base():
     direct = estimate_parameters(CalibrationProblem(base, measured))
     assert_close(found.pose, direct.chain().base, rtol=0, atol=1e-10)
     q = poses(1, seed=5)[0]
-    assert np.max(np.abs(forward_kinematics(direct.chain(), q) - forward_kinematics(arm, q))) < 2e-4  # fmt: skip  # noqa: E501
+    shift = forward_kinematics(direct.chain(), q) - forward_kinematics(arm, q)
+    assert np.max(np.abs(shift)) < 2e-4
 
 
 def test_mounting_needs_points():
