@@ -180,12 +180,15 @@ class Identifiability(NamedTuple):
     Attributes:
         names: of the unknowns that were asked for.
         dependence: of the columns of the weighted Jacobian, in the order of `names`.
+        expected: standard deviations that the independent unknowns will have [m] or
+            [rad], before anything is measured.
         weakest: combination of the independent unknowns that is determined worst, a
             unit vector; each unknown is counted in units of its effect on the readings.
     """
 
     names: tuple[str, ...]
     dependence: Dependence
+    expected: np.ndarray
     weakest: np.ndarray
 
     @property
@@ -252,8 +255,10 @@ def identifiability(
             f"none of {', '.join(problem.names)} has an effect on the readings"
         )
     kept = matrix[:, list(dependence.independent)]
-    _, _, directions = np.linalg.svd(kept / np.linalg.norm(kept, axis=0))
-    return Identifiability(problem.names, dependence, directions[-1])
+    lengths = np.linalg.norm(kept, axis=0)
+    _, values, directions = np.linalg.svd(kept / lengths, full_matrices=False)
+    expected = np.linalg.norm(directions / values[:, None], axis=0) / lengths
+    return Identifiability(problem.names, dependence, expected, directions[-1])
 
 
 # Compiled, unlike what is meant to be transformed: this entry takes concrete numbers
