@@ -131,7 +131,7 @@ def select_poses(
         # rounding must not exchange the same two poses for ever
         better = left[leaves] > left[enters] * (1 + 1e-12)
         chosen = jnp.where(better, larger.at[leaves].set(False), chosen)
-        return _State(chosen, better, state.exchanges + better)
+        return _State(chosen, better, state.exchanges + jnp.where(better, 1, 0))
 
     starts = jax.vmap(choice)(jax.random.split(key, random_choices))
     weights = starts.astype(information.dtype)

@@ -69,7 +69,10 @@ def test_finds_the_best_of_all_choices():
     )
     choices = np.array(list(itertools.combinations(range(9), 3)))
     values = value(candidates[choices])
-    chosen = select_poses(parameters, INSTRUMENT, candidates, 3, key=jax.random.key(1))
+    run = jax.jit(
+        lambda key: select_poses(parameters, INSTRUMENT, candidates, 3, key=key)
+    )
+    chosen = run(jax.random.key(1))
     assert_close(chosen.index, np.max(values), rtol=1e-10)
     assert_close(chosen.indices, choices[np.argmax(values)], rtol=0)
 
@@ -77,14 +80,13 @@ def test_finds_the_best_of_all_choices():
 def test_all_candidates():
     parameters = ChainParameters.of(planar(1.0, 0.7)).select(("a_1", "a_2"))
     candidates = jnp.array([[0.1, 0.2], [0.5, -0.4], [1.0, 1.2]])
-    chosen = select_poses(
-        parameters,
-        INSTRUMENT,
-        candidates,
-        3,
-        key=jax.random.key(0),
-        index=SmallestSingularValueIndex(),
+    index = SmallestSingularValueIndex()
+    run = jax.jit(
+        lambda key: select_poses(
+            parameters, INSTRUMENT, candidates, 3, key=key, index=index
+        )
     )
+    chosen = run(jax.random.key(0))
     assert_close(chosen.indices, np.arange(3), rtol=0)
     assert chosen.exchanges == 0
 

@@ -1,5 +1,6 @@
 """Tool centre point, tool frame and mounting pose: exact, with noise, degenerate."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -199,17 +200,20 @@ def test_points_on_a_line_are_refused():
 
 # ------------------------------------------------------------------------ mounting pose
 
+mount = eqx.filter_jit(mounting_pose)
+simulate = eqx.filter_jit(Measurements.simulated)
+
 
 def test_mounting_pose():
     pose = transform_from_twist(jnp.array([3.0, -1, 0.4, 0.3, -2.0, 1.0]))
     arm = heavy()
     placed = type(arm)(arm.joints, pose, arm.tool, arm.kinds)
     instrument = PointInstrument(5e-5, REFLECTORS)
-    exact = Measurements.simulated(instrument, placed, poses(6))
-    found = mounting_pose(arm, exact)
+    exact = simulate(instrument, placed, poses(6))
+    found = mount(arm, exact)
     assert_close(found.pose, pose, rtol=0, atol=1e-11)
-    noisy = Measurements.simulated(instrument, placed, poses(6), jax.random.key(0))
-    found = mounting_pose(arm, noisy)
+    noisy = simulate(instrument, placed, poses(6), jax.random.key(0))
+    found = mount(arm, noisy)
     # equal deviations everywhere: closed form and refinement minimise the same sum
     assert_close(found.pose, found.fit.pose, rtol=0, atol=1e-10)
     error = inverse_transform(pose) @ found.pose
@@ -218,8 +222,8 @@ def test_mounting_pose():
     assert np.all(size < 5e-5)
     # unequal ones: the refinement is the better fit
     uneven = PointInstrument([1e-5, 1e-5, 1e-3], REFLECTORS)
-    noisy = Measurements.simulated(uneven, placed, poses(6), jax.random.key(0))
-    found = mounting_pose(arm, noisy)
+    noisy = simulate(uneven, placed, poses(6), jax.random.key(0))
+    found = mount(arm, noisy)
     first = CalibrationProblem(found.estimate.problem.parameters, noisy)
     start = first.residuals(first.zero(), first.whitening())
     assert np.sum(start**2) > 2 * found.estimate.chi_square()
@@ -227,13 +231,13 @@ def test_mounting_pose():
 
 def test_mounting_pose_is_a_calibration_of_the_base():
     arm = heavy()
-    measured = Measurements.simulated(
+    measured = simulate(
         PointInstrument(5e-5, REFLECTORS), arm, poses(6), jax.random.key(3)
     )
-    found = mounting_pose(arm, measured)
+    found = mount(arm, measured)
     names = [f"base_{c}" for c in ("x", "y", "z", "rx", "ry", "rz")]
     base = ChainParameters.of(arm).select(names)
-    direct = estimate_parameters(CalibrationProblem(base, measured))
+    direct = eqx.filter_jit(estimate_parameters)(CalibrationProblem(base, measured))
     assert_close(found.pose, direct.chain().base, rtol=0, atol=1e-10)
     q = poses(1, seed=5)[0]
     shift = forward_kinematics(direct.chain(), q) - forward_kinematics(arm, q)
@@ -241,6 +245,6 @@ def test_mounting_pose_is_a_calibration_of_the_base():
 
 
 def test_mounting_needs_points():
-    measured = Measurements.simulated(PoseInstrument(1e-4, 1e-4), heavy(), poses(3))
+    measured = simulate(PoseInstrument(1e-4, 1e-4), heavy(), poses(3))
     with pytest.raises(TypeError, match="PointInstrument, but are those of a PoseIns"):
         mounting_pose(heavy(), measured)
