@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._checks import check_fields, check_values, is_concrete
-from .._custom_types import PerJoint, Transform, as_optional_real, as_real
+from .._custom_types import PerJoint, Transform, as_real
 from ._chain import SerialChain, forward_kinematics
 from ._exponential import rotation_from_vector
 from ._se3 import rotation_error, transform
@@ -174,10 +174,10 @@ class Measurements(eqx.Module):
     """
 
     instrument: AbstractInstrument
-    q: Float[Array, "poses joints"] = eqx.field(converter=as_real)
-    readings: Float[Array, "poses ..."] = eqx.field(converter=as_real)
+    q: Float[Array, "poses joints"] = eqx.field(converter=lambda x: _default(x))
+    readings: Float[Array, "poses ..."] = eqx.field(converter=lambda x: _default(x))
     joint_deviation: PerJoint | None = eqx.field(
-        converter=as_optional_real, default=None
+        converter=lambda x: None if x is None else _default(x), default=None
     )
 
     def __check_init__(self):
@@ -220,8 +220,7 @@ class Measurements(eqx.Module):
             joint_deviation: of the encoders [rad] or [m]; the arm stands beside `q` by
                 errors of that size.
         """
-        q = as_real(q)
-        true, joint_deviation = q, as_optional_real(joint_deviation)
+        true = q = _default(q)
         if key is not None:
             key, joint_key = jax.random.split(key)
             if joint_deviation is not None:
@@ -296,6 +295,11 @@ def _inverse_root(matrix: Float[Array, "n n"]) -> Float[Array, "n n"]:
 
     both = jnp.concatenate([matrix, jnp.eye(number, dtype=matrix.dtype)], axis=1)
     return jax.lax.fori_loop(0, number, eliminate, both)[:, number:]
+
+
+def _default(value) -> Array:
+    """Recordings in single precision are computed with in the default one."""
+    return jnp.asarray(as_real(value), jax.dtypes.canonicalize_dtype(jnp.float64))
 
 
 def _three(value) -> Float[Array, "3"]:
