@@ -3,10 +3,7 @@
 from ._arm import Arm as Arm
 from ._calibration import (
     Calibration as Calibration,
-    Estimate as Estimate,
-    NoiseVariance as NoiseVariance,
     calibrate as calibrate,
-    estimate_parameters as estimate_parameters,
 )
 from ._calibration_problem import (
     RELIABLE_CONDITION as RELIABLE_CONDITION,
@@ -35,6 +32,11 @@ from ._dependence import (
     Dependence as Dependence,
     dependent_columns as dependent_columns,
 )
+from ._estimate import (
+    Estimate as Estimate,
+    NoiseVariance as NoiseVariance,
+    estimate_parameters as estimate_parameters,
+)
 from ._exponential import (
     rotation_from_vector as rotation_from_vector,
     transform_from_twist as transform_from_twist,
@@ -53,6 +55,12 @@ from ._ik_dls import (
     row_weights as row_weights,
     smallest_singular_value as smallest_singular_value,
     solve_damped as solve_damped,
+)
+from ._instruments import (
+    AbstractInstrument as AbstractInstrument,
+    DistanceInstrument as DistanceInstrument,
+    PointInstrument as PointInstrument,
+    PoseInstrument as PoseInstrument,
 )
 from ._jacobian import (
     jacobian as jacobian,
@@ -75,13 +83,7 @@ from ._link_conventions import (
     ModifiedDHJoints as ModifiedDHJoints,
     VeitscheggerWuJoints as VeitscheggerWuJoints,
 )
-from ._measurements import (
-    AbstractInstrument as AbstractInstrument,
-    DistanceInstrument as DistanceInstrument,
-    Measurements as Measurements,
-    PointInstrument as PointInstrument,
-    PoseInstrument as PoseInstrument,
-)
+from ._measurements import Measurements as Measurements
 from ._observability import (
     AbstractObservability as AbstractObservability,
     InverseConditionIndex as InverseConditionIndex,

@@ -53,8 +53,8 @@ class LevenbergMarquardt(optx.AbstractGaussNewton):
     rtol: float
     atol: float
     norm: Callable[..., Any]
-    descent: optx.DampedNewtonDescent
-    search: RoundingSearch
+    descent: optx.AbstractDescent
+    search: optx.AbstractSearch
     verbose: Callable[..., None]
 
     def __init__(self, rtol: float, atol: float):

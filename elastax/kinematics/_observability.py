@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._custom_types import PerJoint, Scalar, as_real
-from ._measurements import AbstractInstrument
+from ._instruments import AbstractInstrument
 from ._parameters import ChainParameters
 
 

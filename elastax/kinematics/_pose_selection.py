@@ -9,7 +9,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from .._checks import check_values
 from .._custom_types import PerJoint, Scalar, as_real, require_float64
-from ._measurements import AbstractInstrument
+from ._instruments import AbstractInstrument
 from ._observability import AbstractObservability, ProductIndex, reading_jacobian
 from ._parameters import ChainParameters
 

@@ -8,10 +8,11 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._custom_types import Scalar, Transform, Vector3, require_float64
-from ._calibration import Estimate, NoiseVariance, estimate_parameters
 from ._calibration_problem import CalibrationProblem
 from ._chain import SerialChain
-from ._measurements import Measurements, PointInstrument
+from ._estimate import Estimate, NoiseVariance, estimate_parameters
+from ._instruments import PointInstrument
+from ._measurements import Measurements
 from ._parameters import ChainParameters
 from ._registration import PointFit, RotationFit, _require, fit_points, mean_rotation
 from ._se3 import inverse_transform, transform

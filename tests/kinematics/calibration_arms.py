@@ -1,13 +1,18 @@
-"""Arms of the calibration tests. Dimensions are illustrative, not a maker's."""
+"""Arms and problems of the calibration tests. Dimensions are illustrative."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from elastax.kinematics import (
+    CalibrationProblem,
+    ChainParameters,
     DHJoints,
     HayatiJoints,
+    Measurements,
     MixedJoints,
     SerialChain,
+    estimate_parameters,
     random_poses,
     rotation_y,
     transform,
@@ -58,3 +63,30 @@ def poses(number: int, seed: int = 0):
 def deviations(units, seed: int = 1, size: float = 5e-4):
     """Random deviations of `size` [m] and [rad]."""
     return size * jax.random.normal(jax.random.key(seed), (len(units),))
+
+
+def problem_of(chain, instrument, q, names=None, joint_deviation=None, **options):
+    """Problem with readings of the nominal arm."""
+    parameters = ChainParameters.of(chain)
+    if names is not None:
+        parameters = parameters.select(names)
+    measured = Measurements.simulated(
+        instrument, chain, q, joint_deviation=joint_deviation
+    )
+    return CalibrationProblem(parameters, measured, **options)
+
+
+def true_problem(problem, x, key=None):
+    """The problem with readings of the arm that deviates by x."""
+    (nominal,) = problem.measurements
+    measured = Measurements.simulated(
+        nominal.instrument, problem.chain(x), nominal.q, key, nominal.joint_deviation
+    )
+    return CalibrationProblem(
+        problem.parameters, measured, problem.prior, problem.encoders
+    )
+
+
+# one program per structure of a problem
+estimate = eqx.filter_jit(estimate_parameters)
+measure = eqx.filter_jit(true_problem)
