@@ -75,7 +75,7 @@ def select_poses(
     Begins with the best of some random choices. Then, as in Mitchell's DETMAX, the
     candidate that adds most is taken in and the pose that is missed least left out,
     until these are the same. The result is a local optimum, never worse than the random
-    choices. All candidates are evaluated at once.
+    choices. All candidates are evaluated at once; call it under `jax.jit`.
 
     Args:
         parameters: that are sought; those that no candidates determine make every

@@ -120,6 +120,35 @@ def test_prior_shrinks_towards_its_mean(small_problem):
     assert problem.rows == measured.rows + 1
 
 
+def test_information_of_several_instruments_adds_up(small_problem):
+    """Poses of a probe and points of a tracker with noisy encoders, one arm."""
+    (points,) = small_problem.measurements
+    probe = Measurements.simulated(
+        PoseInstrument(2e-3, 1e-3), planar(1.0, 0.7), points.q[:2]
+    )
+    noisy = Measurements(points.instrument, points.q, points.readings, [1e-3, 2e-3])
+    parameters = small_problem.parameters
+    found = [
+        estimate(CalibrationProblem(parameters, parts))
+        for parts in (probe, noisy, (probe, noisy))
+    ]
+    first, second, both = (np.linalg.inv(each.covariance) for each in found)
+    # condition numbers of some hundred
+    assert_close(both, first + second, rtol=1e-9, atol=1e-9 * np.max(both))
+    exact = estimate(small_problem)
+    assert np.all(found[1].standard_deviation() > exact.standard_deviation())
+
+
+def test_start_far_from_the_solution():
+    """A base pose that is wrong by half a metre and 30 degrees."""
+    names = tuple(f"base_{c}" for c in ("x", "y", "z", "rx", "ry", "rz"))
+    q = jnp.array([[0.1, 0.5], [1.0, -0.7], [-0.5, 1.2]])
+    problem = problem_of(planar(1.0, 0.7), PoseInstrument(1e-4, 1e-4), q, names)
+    true = jnp.array([0.5, -0.4, 0.3, 0.3, -0.4, 0.5])
+    found = estimate(measure(problem, true))
+    assert_close(found.deviation, true, rtol=0, atol=1e-9)
+
+
 def test_distances_determine_the_arm():
     anchors = np.array([[2.0, 1, 0], [2, -1, 1], [-1, 2, 0.5]])
     instrument = DistanceInstrument(1e-4, anchors, [0.05, 0.0, 0.1])
