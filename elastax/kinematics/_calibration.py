@@ -85,6 +85,10 @@ def calibrate(
 ) -> Calibration:
     """Identify the parameters of an arm from measured poses.
 
+    Axes that are parallel, or nearly so, need `HayatiJoints` or `RPYJoints` between
+    them: Denavit-Hartenberg parameters cannot describe every tilt of parallel axes, and
+    the readings hardly determine those of nearly parallel ones.
+
     Args:
         problem: concrete parameters and readings.
         exclude_dependent: whether parameters that do what others do already stay at

@@ -121,12 +121,19 @@ class CalibrationProblem(eqx.Module):
         return shape.shape[0]
 
     def select(self, names: tuple[str, ...]) -> "CalibrationProblem":
-        """The problem with these unknowns only; the others stay nominal."""
+        """The problem with these unknowns only, in its own order.
+
+        Raises:
+            ValueError: there is no such unknown.
+        """
         encoders = tuple(k for k in self.encoders if f"encoder_{k + 1}" in names)
-        chain = [name for name in names if name in self.parameters.names]
-        return CalibrationProblem(
-            self.parameters.select(chain), self.measurements, self.prior, encoders
-        )
+        entries = tuple(e for e in self.parameters.entries if e.name in names)
+        if unknown := [name for name in names if name not in self.names]:
+            raise ValueError(
+                f"the problem has no unknowns {unknown}: it has {', '.join(self.names)}"
+            )
+        chain = ChainParameters(self.parameters.chain, entries)
+        return CalibrationProblem(chain, self.measurements, self.prior, encoders)
 
     def zero(self) -> Vector:
         """The nominal arm."""
@@ -223,7 +230,7 @@ class Identifiability(NamedTuple):
 
     def weakest_combination(self) -> str:
         """The worst determined combination, without its small terms."""
-        return _sum(self.weakest, self.identifiable, 0.1, "{:.2f} {}")
+        return _sum(self.weakest, self.identifiable, 0.2, "{:.2f} {}")
 
     def _combination(self, factors: np.ndarray) -> str:
         return _sum(factors, self.identifiable, 1e-6, "{:.4g} {}")

@@ -58,6 +58,8 @@ def dependent_columns(matrix: ArrayLike, tolerance: float = 1e-8) -> Dependence:
             left.append(k)
     values = np.linalg.svd(scaled[:, kept], compute_uv=False)
     condition = float(values[0] / values[-1]) if kept else 0.0
-    combination = np.linalg.lstsq(columns[:, kept], columns[:, left], rcond=None)[0]
+    # of scaled columns: their units do not count
+    combination = np.linalg.lstsq(scaled[:, kept], scaled[:, left], rcond=None)[0]
+    combination *= norms[left] / norms[kept][:, None]
     combination[:, ~present[left]] = 0.0
     return Dependence(tuple(kept), tuple(left), combination, condition)
