@@ -153,7 +153,7 @@ class CalibrationProblem(eqx.Module):
         return zero.at[np.array(self.encoders)].set(x[self.parameters.number :])
 
     def whitening(self) -> Whitenings:
-        """What `residuals` needs to take encoder noise into account."""
+        """What `residuals` needs for encoder noise, linear about the nominal arm."""
         return tuple(m.whitening(self.parameters.chain) for m in self.measurements)
 
     def residuals(self, x: Vector, whitening: Whitenings) -> Rows:

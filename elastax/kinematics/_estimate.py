@@ -72,6 +72,8 @@ class Estimate(eqx.Module):
     def correlation(self) -> Float[Array, "parameters parameters"]:
         """Correlation matrix of the parameters."""
         size = self.standard_deviation()
+        # all are zero if the variance is estimated from readings without any error
+        size = jnp.where(size > 0, size, 1.0)
         return self.covariance / (size[:, None] * size[None, :])
 
     def half_width(self, level: float = 0.95) -> Vector:

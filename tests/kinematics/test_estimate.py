@@ -175,6 +175,8 @@ def test_wrong_deviations_show_in_the_probability(small_problem):
     factor = np.sqrt(found.chi_square() / freedom)
     ratio = corrected.standard_deviation() / found.standard_deviation()
     assert_close(ratio, np.full(3, factor), rtol=1e-12)
+    zero = eqx.tree_at(lambda e: e.covariance, found, jnp.zeros((3, 3)))
+    assert_close(zero.correlation(), np.zeros((3, 3)), rtol=0)
     # the normal and Student's t distribution, from tables
     width = lambda found: found.half_width() / found.standard_deviation()
     assert_close(width(found), np.full(3, 1.959964), rtol=1e-6)
