@@ -21,6 +21,17 @@ from ._base_relation import (
     BaseRelation as BaseRelation,
     identify_base_relation as identify_base_relation,
 )
+from ._calibration import (
+    Calibration as Calibration,
+    calibrate as calibrate,
+)
+from ._calibration_problem import (
+    RELIABLE_CONDITION as RELIABLE_CONDITION,
+    CalibrationProblem as CalibrationProblem,
+    GaussianPrior as GaussianPrior,
+    Identifiability as Identifiability,
+    identifiability as identifiability,
+)
 from ._chain import (
     MovingFrames as MovingFrames,
     SerialChain as SerialChain,
@@ -78,6 +89,11 @@ from ._elementary import (
     elementary_pose as elementary_pose,
 )
 from ._elementary_chain import elementary_chain as elementary_chain
+from ._estimate import (
+    Estimate as Estimate,
+    NoiseVariance as NoiseVariance,
+    estimate_parameters as estimate_parameters,
+)
 from ._exponential import (
     rotation_from_vector as rotation_from_vector,
     transform_from_twist as transform_from_twist,
@@ -127,6 +143,12 @@ from ._ik_steps import (
     RestPostureStep as RestPostureStep,
     limit_step as limit_step,
 )
+from ._instruments import (
+    AbstractInstrument as AbstractInstrument,
+    DistanceInstrument as DistanceInstrument,
+    PointInstrument as PointInstrument,
+    PoseInstrument as PoseInstrument,
+)
 from ._inverse_motion import (
     AbstractRateInverse as AbstractRateInverse,
     DampedRateInverse as DampedRateInverse,
@@ -171,11 +193,12 @@ from ._manipulability import (
     scaled_jacobian as scaled_jacobian,
     velocity_ellipsoid as velocity_ellipsoid,
 )
+from ._measurements import Measurements as Measurements
 from ._minimal import (
     MinimalModel as MinimalModel,
+    generic_poses as generic_poses,
     minimal_model as minimal_model,
     parameter_count as parameter_count,
-    random_poses as random_poses,
 )
 from ._motion import (
     ToolMotion as ToolMotion,
@@ -189,6 +212,17 @@ from ._motion_limits import (
     MotionLimits as MotionLimits,
     check_motion as check_motion,
     motion_margins as motion_margins,
+)
+from ._observability import (
+    AbstractObservability as AbstractObservability,
+    InverseConditionIndex as InverseConditionIndex,
+    MeanVarianceIndex as MeanVarianceIndex,
+    NoiseAmplificationIndex as NoiseAmplificationIndex,
+    ProductIndex as ProductIndex,
+    ReciprocalSumIndex as ReciprocalSumIndex,
+    SmallestSingularValueIndex as SmallestSingularValueIndex,
+    observability as observability,
+    reading_jacobian as reading_jacobian,
 )
 from ._orientation import (
     abc_from_rotation as abc_from_rotation,
@@ -220,6 +254,10 @@ from ._pose_derivatives import (
     pose_gradient as pose_gradient,
     pose_hessian as pose_hessian,
 )
+from ._pose_selection import (
+    PoseSelection as PoseSelection,
+    select_poses as select_poses,
+)
 from ._posture import (
     Posture as Posture,
     branch_index as branch_index,
@@ -239,6 +277,13 @@ from ._reach import (
 from ._redundancy import (
     hard_and_soft as hard_and_soft,
     weighted_correction as weighted_correction,
+)
+from ._registration import (
+    PointFit as PointFit,
+    RotationFit as RotationFit,
+    fit_points as fit_points,
+    mean_rotation as mean_rotation,
+    nearest_rotation as nearest_rotation,
 )
 from ._resolved_motion import resolved_motion as resolved_motion
 from ._se3 import (
@@ -266,6 +311,7 @@ from ._singularities import (
     drive_singularity as drive_singularity,
     parameter_singularity as parameter_singularity,
 )
+from ._starts import random_joints as random_joints
 from ._statics import (
     WrenchEstimate as WrenchEstimate,
     generalised_wrench as generalised_wrench,
@@ -294,6 +340,15 @@ from ._taylor_expansion import (
     taylor_polynomials as taylor_polynomials,
     taylor_remainder as taylor_remainder,
 )
+from ._tool_pose import (
+    Mounting as Mounting,
+    ToolCentre as ToolCentre,
+    frame_from_points as frame_from_points,
+    mounting_pose as mounting_pose,
+    tool_centre_point as tool_centre_point,
+    tool_frame as tool_frame,
+    tool_orientation as tool_orientation,
+)
 from ._uncertainty import (
     Quantisation as Quantisation,
     explicit_sensitivity as explicit_sensitivity,
@@ -311,7 +366,6 @@ from ._workspace import (
     SampledSection as SampledSection,
     joint_grid as joint_grid,
     pose_quality as pose_quality,
-    random_joints as random_joints,
     reachable_points as reachable_points,
     sampled_section as sampled_section,
     section_map as section_map,

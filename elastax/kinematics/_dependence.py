@@ -32,7 +32,8 @@ def dependent_columns(matrix: ArrayLike, tolerance: float = 1e-8) -> Dependence:
     Args:
         matrix: concrete numbers, shape (rows, columns).
         tolerance: a column depends on those kept in front of it if no more than this
-            share of it is left outside their range; a zero column always does.
+            share of it is left outside their range. A zero column always does, and
+            so does one of less than 1e-12 of the longest: that is rounding.
 
     Raises:
         ValueError: the matrix is not finite.
@@ -44,12 +45,13 @@ def dependent_columns(matrix: ArrayLike, tolerance: float = 1e-8) -> Dependence:
     scaled = columns / np.where(norms > 0, norms, 1.0)
     basis = np.zeros((columns.shape[0], 0))
     kept, left = [], []
+    present = norms > 1e-12 * norms.max(initial=0.0)
     for k in range(columns.shape[1]):
         rest = scaled[:, k]
         for _ in range(2):  # the second projection removes what rounding left
             rest = rest - basis @ (basis.T @ rest)
         length = np.linalg.norm(rest)
-        if norms[k] > 0 and length > tolerance:
+        if present[k] and length > tolerance:
             kept.append(k)
             basis = np.column_stack([basis, rest / length])
         else:
@@ -59,4 +61,5 @@ def dependent_columns(matrix: ArrayLike, tolerance: float = 1e-8) -> Dependence:
     # of scaled columns: their units do not count
     combination = np.linalg.lstsq(scaled[:, kept], scaled[:, left], rcond=None)[0]
     combination *= norms[left] / norms[kept][:, None]
+    combination[:, ~present[left]] = 0.0
     return Dependence(tuple(kept), tuple(left), combination, condition)

@@ -102,7 +102,7 @@ def minimal_model(
     """
     require_float64("a minimal model")
     count, length = parameter_count(chain), characteristic_length(chain)
-    poses = random_poses(chain) if poses is None else poses
+    poses = generic_poses(chain) if poses is None else poses
     conversion, keep = "", tuple(keep)
     for convert in (None, to_mixed, to_rpy):
         if convert is None and _has_structure(chain):
@@ -134,7 +134,7 @@ def minimal_model(
     )
 
 
-def random_poses(
+def generic_poses(
     chain: SerialChain, number: int = 30, seed: int = 0
 ) -> Float[Array, "poses joints"]:
     """Joint coordinates in all directions: a turn of hinges, an arm's length of slides.

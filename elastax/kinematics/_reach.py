@@ -17,7 +17,7 @@ from jaxtyping import Array, Float
 from .._custom_types import PerJoint, Scalar, Vector3
 from ._chain import SerialChain, forward_kinematics
 from ._joints import JointKind
-from ._workspace import random_joints
+from ._starts import random_joints
 
 
 _STARTS = 32
@@ -102,7 +102,7 @@ def _extremes(
 ) -> tuple[PerJoint, PerJoint]:
     """Coordinates with the smallest and with the largest value."""
     if starts is None:
-        starts = random_joints(jax.random.key(0), lower, upper, _STARTS)
+        starts = random_joints(lower, upper, _STARTS, key=jax.random.key(0))
     sliding = jnp.asarray([kind is JointKind.PRISMATIC for kind in chain.kinds])
     # by the envelope theorem only the limits move the extreme to first order
     fixed, low, high, starts = jax.lax.stop_gradient((chain, lower, upper, starts))

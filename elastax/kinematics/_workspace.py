@@ -6,7 +6,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
+from jaxtyping import Array, Bool, Float, Int
 
 from .._custom_types import Matrix3, PerJoint, Scalar, Transform, Vector3
 from ._chain import SerialChain, forward_kinematics
@@ -38,20 +38,6 @@ def joint_grid(
     lines = [np.linspace(0, 1, c) if c > 1 else np.array([0.5]) for c in counts]
     shares = np.stack([x.ravel() for x in np.meshgrid(*lines, indexing="ij")], axis=1)
     shares = jnp.asarray(shares, lower.dtype)
-    return lower[None] + shares * (upper - lower)[None]
-
-
-def random_joints(
-    key: PRNGKeyArray, lower: PerJoint, upper: PerJoint, samples: int
-) -> Float[Array, "samples joints"]:
-    """Independent joint coordinates, uniform between the limits.
-
-    Args:
-        key: of the random numbers.
-        lower, upper: limits [rad] or [m], shape (joints,).
-        samples: their number.
-    """
-    shares = jax.random.uniform(key, (samples, lower.shape[0]), lower.dtype)
     return lower[None] + shares * (upper - lower)[None]
 
 

@@ -12,9 +12,9 @@ from elastax.kinematics import (
     SerialChain,
     characteristic_length,
     forward_kinematics,
+    generic_poses,
     minimal_model,
     parameter_count,
-    random_poses,
     rotation_error,
     stacked_jacobian,
     to_hayati,
@@ -60,7 +60,7 @@ def model(name):
 @functools.cache
 def experiment(name):
     """Poses of a chain, and a program: deviate, then errors and slopes."""
-    q = random_poses(ARMS[name][0](), 20, seed=1)
+    q = generic_poses(ARMS[name][0](), 20, seed=1)
 
     def tool(chain):
         return jax.vmap(forward_kinematics, (None, 0))(chain, q)
@@ -98,7 +98,7 @@ def test_count_and_rank(name):
     chain, minimal = make(), model(name)
     assert parameter_count(chain) == minimal.parameters.number == count
     # other poses than those that chose the parameters
-    poses = random_poses(chain, 12, seed=5)
+    poses = generic_poses(chain, 12, seed=5)
     length = characteristic_length(chain)
     assert minimal.length == pytest.approx(length)
     matrix, _ = scaled_jacobian(minimal.parameters, poses, length)
@@ -112,7 +112,7 @@ def test_count_and_rank(name):
 def test_count_is_the_rank_of_all_displacements(name):
     # of every joint, base and tool, that is with the most that can be said
     make, count = ARMS[name]
-    chain, poses = make(), random_poses(make(), 12, seed=5)
+    chain, poses = make(), generic_poses(make(), 12, seed=5)
     everything = ChainParameters.of(to_rpy(chain))
     matrix, _ = scaled_jacobian(everything, poses, characteristic_length(chain))
     assert everything.number == 6 * (chain.number + 2) > count
@@ -123,7 +123,7 @@ def test_count_is_the_rank_of_all_displacements(name):
 def test_excluded_parameters_are_the_combinations(name):
     minimal = model(name)
     parameters = ChainParameters.of(minimal.parameters.chain)
-    q = random_poses(parameters.chain, 4, seed=6)
+    q = generic_poses(parameters.chain, 4, seed=6)
     columns = np.asarray(stacked_jacobian(parameters, q))
     column = lambda n: columns[:, parameters.names.index(n)]
     assert len(minimal.excluded) == parameters.number - minimal.parameters.number
@@ -219,9 +219,9 @@ def test_refusals():
         minimal_model(coaxial(), poses=jnp.ones((2, 3)))
 
 
-def test_random_poses():
-    poses = random_poses(gantry(), 1000, seed=3)
-    assert_close(poses, random_poses(gantry(), 1000, seed=3), rtol=0.0)
+def test_generic_poses():
+    poses = generic_poses(gantry(), 1000, seed=3)
+    assert_close(poses, generic_poses(gantry(), 1000, seed=3), rtol=0.0)
     reach = np.max(np.abs(poses), axis=0)
     size = characteristic_length(gantry())
     limits = np.array([size] * 3 + [np.pi] * 3)

@@ -64,7 +64,7 @@ def test_no_sample_is_beyond():
     for chain in (kuka(), mixed()):
         wide = jnp.full(chain.number, 1.5)
         found = reach(chain, -wide, wide)
-        q = random_joints(jax.random.key(5), -wide, wide, 20000)
+        q = random_joints(-wide, wide, 20000, key=jax.random.key(5))
         distance = jnp.linalg.norm(jax.jit(reachable_points)(chain, q), axis=1)
         assert float(distance.max()) <= float(found.largest)
         assert float(distance.min()) >= float(found.least)

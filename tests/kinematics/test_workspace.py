@@ -38,7 +38,7 @@ def test_grid_and_samples_of_joints():
     grid = joint_grid(lower, upper, (3, 2, 1))
     expected = [[a, b, 3.0] for a in (-1.0, 0, 1) for b in (0.0, 2)]
     assert_close(grid, np.array(expected), rtol=1e-15)
-    samples = random_joints(jax.random.key(0), lower, upper, 1000)
+    samples = random_joints(lower, upper, 1000, key=jax.random.key(0))
     assert np.all((samples >= lower[None]) & (samples <= upper[None]))
     # a uniform mean is known to 0.6 / sqrt(1000)
     assert_close(samples.mean(axis=0), (lower + upper) / 2, rtol=0.0, atol=0.08)
@@ -50,7 +50,7 @@ def test_grid_and_samples_of_joints():
 
 def test_points_are_in_the_ring():
     chain, limit = planar(0.5, 0.4), jnp.full(2, np.pi)
-    q = random_joints(jax.random.key(1), -limit, limit, 500)
+    q = random_joints(-limit, limit, 500, key=jax.random.key(1))
     points = jax.jit(reachable_points)(chain, q)
     radius = jnp.linalg.norm(points[:, :2], axis=1)
     assert float(radius.min()) > 0.1 and float(radius.max()) < 0.9
