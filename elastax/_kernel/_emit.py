@@ -22,6 +22,7 @@ from jaxlib.mlir import ir
 from jaxlib.mlir.dialects import func, mhlo, stablehlo as hlo
 
 from ._graph import NotScalarError
+from ._late_constants import folds_late
 from ._program import Program
 from ._stages import depends, stages
 
@@ -134,6 +135,7 @@ class _Kernel:
         program: Program,
         levels: tuple[int, ...],
         shapes: Sequence[tuple[int, ...]],
+        joined: bool,
         add_function: Callable,
     ):
         self.graph, self.results = program.scalars
@@ -149,6 +151,7 @@ class _Kernel:
         self.used = sorted({self._place_of(n)[0] for n in inputs})
         axes = [level for level, size in enumerate(levels) if size > 1]
         self.axes = sorted(axes, key=lambda level: -self._dependent(level))
+        self.joined = joined or bool(axes)
         self.stages = stages(
             self.graph,
             self.results,
@@ -178,10 +181,11 @@ class _Kernel:
     def operand_types(self) -> list[Any]:
         """Rows for one sample; for a batch one vector with all operands in it.
 
-        XLA cannot hand a large constant to a loop in here and would abort: a vector of
-        all operands is constant only if all of them are.
+        XLA cannot hand a large constant to a loop in here, nor a constant that it finds
+        late to anything in here, and would abort: a vector of all operands is constant
+        only if all of them are.
         """
-        if not self.axes:
+        if not self.joined:
             return [_tensor((1, self.sizes[k]), self.dtype) for k in self.used]
         return [_tensor((sum(self._lengths()),), self.dtype)] if self.used else []
 
@@ -190,7 +194,7 @@ class _Kernel:
 
     def gather(self, operands: Sequence[Any]) -> list[Any]:
         """The kernel's operands from those of the primitive."""
-        if not self.axes:
+        if not self.joined:
             kinds = self.operand_types()
             return [hlo.reshape(t, operands[k]) for t, k in zip(kinds, self.used)]
         flat = [
@@ -208,7 +212,7 @@ class _Kernel:
             self._stage(d, nodes)
             for d, nodes in enumerate([*self.stages.handed, self.results])
         ]
-        if not self.axes:
+        if not self.joined:
             rows: dict[Any, Any] = dict(zip(self.used, operands))
             return self._run(functions[0], rows)
         self.functions = functions
@@ -400,16 +404,17 @@ def emit_kernel(
     if graph.depth(results) > _DEEPEST:
         raise NotScalarError("too long a chain of operations")
     shapes = [a.shape[: len(levels)] for a in ctx.avals_in]
-    kernel, function = _function(ctx, program, levels, tuple(shapes))
+    folded = not any(size > 1 for size in levels) and any(map(folds_late, operands))
+    kernel, function = _function(ctx, program, levels, tuple(shapes), folded)
     gathered = kernel.gather(operands)
     results = _call(function, gathered, {"xla_cpu_small_call": "true"})
     return _split(results, program, levels)
 
 
-def _function(ctx, program, levels, shapes):
+def _function(ctx, program, levels, shapes, joined):
     """The kernel and its function in this module, made once."""
     cache = ctx.module_context.cached_primitive_lowerings
-    key = ("elastax_kernel", program, levels, shapes)
+    key = ("elastax_kernel", program, levels, shapes, joined)
     if key in cache:
         return cache[key]
     context = ctx.module_context
@@ -422,7 +427,7 @@ def _function(ctx, program, levels, shapes):
         context.symbol_table.insert(function)
         return function
 
-    kernel = _Kernel(program, levels, shapes, add_function)
+    kernel = _Kernel(program, levels, shapes, joined, add_function)
     inputs = kernel.operand_types()
     output = _tensor(kernel.result_shape(), kernel.dtype)
     function = add_function("kernel", ir.FunctionType.get(inputs, [output]))

@@ -153,4 +153,5 @@ ad.primitive_jvps[kernel_p] = _push
 ad.primitive_transposes[kernel_p] = _pull
 partial_eval.dce_rules[kernel_p] = _leave_out
 mlir.register_lowering(kernel_p, _lower_written_out)
-mlir.register_lowering(kernel_p, _lower_on_cpu, platform="cpu")
+# not cached: the lowering looks at how operands are computed; it shares what it makes
+mlir.register_lowering(kernel_p, _lower_on_cpu, platform="cpu", cacheable=False)

@@ -12,7 +12,7 @@ from ..io import UrdfWarning
 from ..kinematics import Arm
 from ..robots import named_model
 from ._arguments import InfoConfig
-from ._info_arm import arm_of, kinematics_text
+from ._info_arm import kinematics_text
 from ._progress import Progress
 from ._tables import table
 
@@ -60,7 +60,7 @@ def _print_robot(robot: ElasticRobot, progress: Progress) -> None:
         f"{robot.name}: {robot.axes} axes, {robot.elastic} elastic coordinates, "
         f"moving mass {mass:.0f} kg, payload {load:g} kg\n"
     )
-    print(kinematics_text(arm_of(robot)), end="\n\n")
+    print(kinematics_text(robot.arm()), end="\n\n")
     print(axes_table(robot), end="\n\n")
     if robot.elastic:
         print(structure_table(robot), end="\n\n")

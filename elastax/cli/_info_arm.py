@@ -3,8 +3,14 @@
 import numpy as np
 
 from .._rpy import rpy_of
-from ..dynamics import ElasticRobot
-from ..kinematics import Arm, JointKind, SerialChain, SphericalWrist, length_doubts
+from ..kinematics import (
+    Arm,
+    JointKind,
+    SerialChain,
+    SphericalWrist,
+    length_doubts,
+    to_dh,
+)
 from ._geometry import (
     SAME,
     Geometry,
@@ -17,35 +23,14 @@ from ._geometry import (
 from ._tables import table
 
 
-def arm_of(robot: ElasticRobot) -> Arm:
-    """The rigid robot's kinematics."""
-    signs, zeros = np.asarray(robot.axis_signs), np.asarray(robot.axis_zeros)
-    limits = robot.limits
-    ends = np.sort(
-        [signs * np.asarray(x) + zeros for x in (limits.lower, limits.upper)], axis=0
-    )
-    return Arm(
-        robot.rigid().chain,
-        ends[0],
-        ends[1],
-        limits.velocity,
-        signs,
-        zeros,
-        robot.poses,
-        robot.name,
-        robot.axis_names,
-        robot.sources,
-        robot.assumptions,
-    )
-
-
 def kinematics_text(arm: Arm) -> str:
     """Everything about the kinematics, section by section."""
     zero = geometry(arm.chain, np.zeros(arm.chain.number))
     sections = [
         "Joints: where they are and turn at q = 0, in the base frame\n"
         + joint_table(arm, zero),
-        # a table of Denavit-Hartenberg parameters belongs here
+        "Denavit-Hartenberg parameters; q adds to theta, or to d where a joint slides\n"
+        + denavit_table(arm),
         frame_lines(arm, zero),
         "\n".join([reach_line(arm, zero), *inverse_lines(arm, zero)]),
         "Named poses\n" + pose_table(arm),
@@ -71,7 +56,7 @@ def joint_table(arm: Arm, zero: Geometry) -> str:
                 _point(zero.origins[k]),
                 _direction(zero.axes[k]),
                 f"{float(arm.signs[k]):+.0f}",
-                f"{float(shown(arm.zeros[k])):g}",
+                f"{float(shown(arm.zeros[k])) + 0.0:g}",
                 f"{ends[0]:g} .. {ends[1]:g}",
                 f"{float(shown(arm.velocity[k])):g}",
             ]
@@ -91,6 +76,36 @@ def joint_table(arm: Arm, zero: Geometry) -> str:
             f"speed {unit[:-1]}/s]",
         ],
     )
+
+
+def denavit_table(arm: Arm) -> str:
+    """Standard Denavit-Hartenberg parameters, or why there are none."""
+    try:
+        chain = to_dh(arm.chain)
+    except ValueError as error:
+        return f"none: {error}"
+    joints = chain.joints
+    names = ("theta", "d", "a", "alpha")
+    columns = [np.asarray(getattr(joints, name)) for name in names]
+    rows = [
+        [
+            axis,
+            f"{np.rad2deg(columns[0][k]) + 0.0:.6g}",
+            f"{columns[1][k] + 0.0:.6g}",
+            f"{columns[2][k] + 0.0:.6g}",
+            f"{np.rad2deg(columns[3][k]) + 0.0:.6g}",
+        ]
+        for k, axis in enumerate(arm.axis_names)
+    ]
+    titles = ["axis", "theta [deg]", "d [m]", "a [m]", "alpha [deg]"]
+    ends = (("frame in front of the first row", chain.base, "base"),)
+    ends += (("tool behind the last row", chain.tool, "last"),)
+    lines = [
+        f"{which}: {_pose(np.asarray(pose), frame)}"
+        for which, pose, frame in ends
+        if not np.allclose(pose, np.eye(4), atol=1e-9)
+    ]
+    return "\n".join([table(rows, titles), *lines])
 
 
 def frame_lines(arm: Arm, zero: Geometry) -> str:
@@ -137,7 +152,7 @@ def inverse_lines(arm: Arm, zero: Geometry) -> list[str]:
         return [
             f"wrist: {_wrist(arm, zero)}",
             *_parallel(arm, zero),
-            "inverse kinematics: iterative (`solve_damped`); the closed form of a "
+            "inverse kinematics: iterative (`find_pose`); the closed form of a "
             f"spherical wrist does not apply: {reason}",
         ]
     return [
@@ -271,7 +286,7 @@ def _degrees(pose: np.ndarray) -> np.ndarray:
     return np.round(np.rad2deg(rpy_of(pose[:3, :3])), 8) + 0.0
 
 
-def _pose(pose: np.ndarray) -> str:
+def _pose(pose: np.ndarray, frame: str = "base") -> str:
     angles = " ".join(f"{angle:g}" for angle in _degrees(pose))
     place = " ".join(_point(pose[:3, 3]).split())
-    return f"{place} m, roll pitch yaw {angles} deg in the base frame"
+    return f"{place} m, roll pitch yaw {angles} deg in the {frame} frame"

@@ -95,9 +95,9 @@ def pose_derivative(
         ValueError: `orders` has another shape, or is negative.
 
     References:
-        [KinModell] (3-24) to (3-29). Of the print, (3-25) has a wrong angle in its second
-        line, (3-27) shifts by $(n-1)\,\tfrac{\pi}{2}\,e_\varepsilon$, and (3-29) lacks
-        its n.
+        [KinModell] (3-24) to (3-29). Of the print, (3-25) has a wrong angle in its
+        second line, (3-27) shifts by $(n-1)\,\tfrac{\pi}{2}\,e_\varepsilon$, and
+        (3-29) lacks its n.
     """
     orders = jnp.asarray(orders)
     if orders.shape != (factors.number,):

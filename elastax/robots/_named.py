@@ -6,10 +6,14 @@ from collections.abc import Callable
 from ..dynamics import ElasticRobot
 from ..io import arm_from_urdf, load_robot, robot_from_urdf
 from ..kinematics import Arm
+from ._fanuc import fanuc
+from ._iiwa14 import iiwa14
 from ._kr16 import kr16
 from ._kr210 import kr210
 from ._kr300 import kr300
 from ._manutec_r3 import manutec_r3
+from ._planar_2r import planar_2r
+from ._ur10e import ur10e
 
 
 ROBOTS = {
@@ -19,7 +23,12 @@ ROBOTS = {
     "manutec_r3": manutec_r3,
 }
 # records of arms without dynamics
-ARMS: dict[str, Callable[[], Arm]] = {}
+ARMS: dict[str, Callable[[], Arm]] = {
+    "fanuc": fanuc,
+    "iiwa14": iiwa14,
+    "planar_2r": planar_2r,
+    "ur10e": ur10e,
+}
 
 
 def named_robot(name: str | pathlib.Path) -> ElasticRobot:
@@ -47,6 +56,11 @@ def named_robot(name: str | pathlib.Path) -> ElasticRobot:
                 f"{beside} as in `examples/urdf_robot.toml`"
             )
         return _read(lambda: robot_from_urdf(path, beside))
+    if str(name) in ARMS:
+        raise ValueError(
+            f"`{name}` is an arm without dynamics, which `elastax info {name}` shows: "
+            f"take one of {', '.join(ROBOTS)}"
+        )
     raise ValueError(
         f"the robot `{name}` is unknown: take one of {', '.join(ROBOTS)}, or the path "
         "of a file that ends in `.toml` or `.urdf`"

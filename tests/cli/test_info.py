@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from elastax.cli import main
 from elastax.cli._geometry import angle_between, distance, geometry, jacobian_of
-from elastax.cli._info_arm import arm_of, kinematics_text
+from elastax.cli._info_arm import kinematics_text
 from elastax.kinematics import Arm, forward_kinematics, jacobian, moving_frames
 from elastax.robots import kr210
 
@@ -30,7 +30,7 @@ def _own_cache(monkeypatch):
 
 @pytest.fixture(scope="module")
 def arm():
-    return arm_of(kr210())
+    return kr210().arm()
 
 
 def test_geometry_is_that_of_the_kinematics():
