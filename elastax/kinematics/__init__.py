@@ -117,7 +117,6 @@ from ._ik_dls import (
     solve_damped as solve_damped,
 )
 from ._ik_elastic import geometric_correction as geometric_correction
-from ._ik_evaluate import pose_difference as pose_difference
 from ._ik_minimise import minimise_pose as minimise_pose
 from ._ik_numeric import (
     NumericSolution as NumericSolution,
@@ -180,7 +179,7 @@ from ._link_conventions import (
     VeitscheggerWuJoints as VeitscheggerWuJoints,
 )
 from ._logarithm import (
-    displacement as displacement,
+    pose_difference as pose_difference,
     twist_from_transform as twist_from_transform,
     vector_from_rotation as vector_from_rotation,
 )

@@ -256,7 +256,7 @@ def identifiability(
     """
     require_float64("a calibration")
     matrix = np.asarray(_nominal_jacobian(problem))
-    dependence = dependent_columns(matrix, tolerance)
+    dependence = dependent_columns(matrix, tolerance, rounding=1e-12)
     if not dependence.independent:
         raise ValueError(
             f"none of {', '.join(problem.names)} has an effect on the readings"

@@ -23,7 +23,9 @@ class Dependence(NamedTuple):
     condition: float
 
 
-def dependent_columns(matrix: ArrayLike, tolerance: float = 1e-8) -> Dependence:
+def dependent_columns(
+    matrix: ArrayLike, tolerance: float = 1e-8, *, rounding: float = 0.0
+) -> Dependence:
     """Keep the first columns that are independent, and name the others.
 
     Columns are scaled to length one, and go in their order: of two that say the same
@@ -32,8 +34,9 @@ def dependent_columns(matrix: ArrayLike, tolerance: float = 1e-8) -> Dependence:
     Args:
         matrix: concrete numbers, shape (rows, columns).
         tolerance: a column depends on those kept in front of it if no more than this
-            share of it is left outside their range. A zero column always does, and
-            so does one of less than 1e-12 of the longest: that is rounding.
+            share of it is left outside their range. A zero column always does.
+        rounding: columns up to this share of the longest count as zero; for columns of
+            one unit, such as those of a scaled Jacobian.
 
     Raises:
         ValueError: the matrix is not finite.
@@ -45,7 +48,7 @@ def dependent_columns(matrix: ArrayLike, tolerance: float = 1e-8) -> Dependence:
     scaled = columns / np.where(norms > 0, norms, 1.0)
     basis = np.zeros((columns.shape[0], 0))
     kept, left = [], []
-    present = norms > 1e-12 * norms.max(initial=0.0)
+    present = norms > rounding * norms.max(initial=0.0)
     for k in range(columns.shape[1]):
         rest = scaled[:, k]
         for _ in range(2):  # the second projection removes what rounding left

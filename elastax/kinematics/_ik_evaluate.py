@@ -14,6 +14,7 @@ from .._taylor import leading
 from ._chain import SerialChain, moving_frames
 from ._ik_dls import damped_least_squares
 from ._jacobian import tool_jacobian
+from ._logarithm import pose_difference
 from ._se3 import inverse_transform, transform
 from ._structured import JointStructure, StructuredJoints
 
@@ -22,52 +23,6 @@ Difference = Float[Array, "6"]
 Geometric = Float[Array, "6 joints"]
 
 _ROUNDING = 1e-12  # damping squared over squared size: above rounding, below accuracy
-
-
-def turn_between(target: Matrix3, actual: Matrix3) -> Vector3:
-    r"""Rotation vector of $R_t R_a^T$ in the base frame [rad], of length 0 to $\pi$.
-
-    Its direction holds up to half a turn, where the small-angle error of
-    `rotation_error` vanishes. Through the largest of the four quaternion components,
-    so that no root of a difference is taken.
-    """
-    m = target @ actual.T
-    trace = m[0, 0] + m[1, 1] + m[2, 2]
-    odd = [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]]
-    even = [m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1]]
-    # multiples of (w, x, y, z): by 4w, 4x, 4y, 4z
-    rows = [
-        [1 + trace, odd[0], odd[1], odd[2]],
-        [odd[0], 1 + 2 * m[0, 0] - trace, even[0], even[1]],
-        [odd[1], even[0], 1 + 2 * m[1, 1] - trace, even[2]],
-        [odd[2], even[1], even[2], 1 + 2 * m[2, 2] - trace],
-    ]
-    best, largest = rows[0], rows[0][0]
-    for k in (1, 2, 3):
-        larger = rows[k][k] > largest
-        best = [jnp.where(larger, a, b) for a, b in zip(rows[k], best)]
-        largest = jnp.where(larger, rows[k][k], largest)
-    scalar, vector = best[0], jnp.stack(best[1:])
-    square = vector @ vector
-    # a safe operand where the branch is not taken: the root has no slope at zero
-    tiny = square <= 1e-20 * scalar**2
-    length = jnp.sqrt(jnp.where(tiny, 1.0, square))
-    sign = jnp.where(scalar < 0, -1.0, 1.0)
-    angle = 2 * jnp.arctan2(length, jnp.abs(scalar))
-    factor = jnp.where(tiny, 2 / jnp.where(tiny, scalar, 1.0), sign * angle / length)
-    return factor * vector
-
-
-def pose_difference(target: Transform, actual: Transform) -> Difference:
-    """Target minus actual: translation [m] above rotation vector [rad], base frame.
-
-    Unlike `pose_error` it is exact at large turns.
-
-    References:
-        [KinModell] (3-43), [Reiner2010] (3.57a).
-    """
-    turn = turn_between(target[:3, :3], actual[:3, :3])
-    return jnp.concatenate([target[:3, 3] - actual[:3, 3], turn])
 
 
 @kernel

@@ -17,7 +17,7 @@ from ._ik_dls import (
 )
 from ._ik_evaluate import attached, errors_of, evaluate
 from ._ik_steps import AbstractStep, ErrorDampedStep, limit_step
-from ._jacobian import jacobian
+from ._manipulability import scaled_jacobian
 
 
 class NumericSolution(eqx.Module):
@@ -60,9 +60,8 @@ def singular_distance(
         [Reiner2010] (3.64), [KinModell] (3-42), with rows of one unit.
     """
     check_indices("rows", rows, 6)
-    weights = row_weights(characteristic_length, rows)
     return smallest_singular_value(
-        weights[:, None] * jacobian(chain, q)[np.array(rows)]
+        scaled_jacobian(chain, q, characteristic_length, rows)
     )
 
 

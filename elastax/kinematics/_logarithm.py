@@ -80,8 +80,8 @@ def twist_from_transform(pose: Transform) -> Float[Array, "6"]:
 
 
 @kernel
-def displacement(target: Transform, actual: Transform) -> Float[Array, "6"]:
-    """Displacement from an actual pose to a target, translation above rotation.
+def pose_difference(target: Transform, actual: Transform) -> Float[Array, "6"]:
+    """Target minus actual: translation [m] above rotation vector [rad].
 
     Like `pose_error`, but with the rotation vector in place of its sine: exact for
     large rotations too, and zero only where the poses are equal.
@@ -92,6 +92,9 @@ def displacement(target: Transform, actual: Transform) -> Float[Array, "6"]:
     Returns:
         Difference of the origins [m] and rotation vector [rad], in the base frame,
         shape (6,).
+
+    References:
+        [KinModell] (3-43), [Reiner2010] (3.57a).
     """
     vector = vector_from_rotation(target[:3, :3] @ actual[:3, :3].T)
     return jnp.concatenate([target[:3, 3] - actual[:3, 3], vector])

@@ -17,6 +17,7 @@ from .._custom_types import PerJoint, Scalar
 from ._chain import SerialChain
 from ._ik_dls import row_weights
 from ._jacobian import jacobian
+from ._singular_values import singular_values
 
 
 Scaled = Float[Array, "rows joints"]
@@ -53,7 +54,7 @@ def manipulability(jacobian: Scaled) -> Scalar:
     Args:
         jacobian: shape (rows, joints), in one unit.
     """
-    return jnp.prod(jnp.linalg.svd(jacobian, compute_uv=False))
+    return jnp.prod(singular_values(jacobian))
 
 
 def inverse_condition_number(jacobian: Scaled) -> Scalar:
@@ -62,7 +63,7 @@ def inverse_condition_number(jacobian: Scaled) -> Scalar:
     Args:
         jacobian: shape (rows, joints), in one unit.
     """
-    values = jnp.linalg.svd(jacobian, compute_uv=False)
+    values = singular_values(jacobian)
     # a matrix of zeros is singular too
     return values[-1] / jnp.where(values[0] > 0, values[0], 1.0)
 
@@ -103,7 +104,7 @@ def velocity_ellipsoid(jacobian: Scaled) -> Ellipsoid:
     """
     fixed = jax.lax.stop_gradient(jacobian)
     axes = jnp.linalg.svd(fixed, full_matrices=True)[0]
-    lengths = jnp.linalg.svd(jacobian, compute_uv=False)
+    lengths = singular_values(jacobian)
     short = jacobian.shape[0] - lengths.shape[0]
     return Ellipsoid(axes, jnp.concatenate([lengths, jnp.zeros(short, axes.dtype)]))
 

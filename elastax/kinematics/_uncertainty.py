@@ -16,7 +16,7 @@ from jaxtyping import Array, Float
 from .._custom_types import PerJoint
 from ._chain import forward_kinematics
 from ._jacobian import jacobian
-from ._logarithm import displacement
+from ._logarithm import pose_difference
 from ._parameters import ChainParameters, parameter_jacobian
 
 
@@ -207,7 +207,7 @@ def tool_deviation(
         shape (6,).
     """
     moved = parameters.moved(parameter_deviation)
-    return displacement(
+    return pose_difference(
         forward_kinematics(moved, q + joint_deviation),
         forward_kinematics(parameters.chain, q),
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 from elastax.kinematics import (
-    displacement,
+    pose_difference,
     pose_error,
     rotation_about,
     rotation_from_vector,
@@ -133,7 +133,7 @@ def test_gradient_and_batches(maps):
 
 def test_displacement_is_the_pose_error_with_the_angle():
     target, actual = jax.vmap(transform_from_twist)(twists([0.7, 1.9]))
-    found = displacement(target, actual)
+    found = pose_difference(target, actual)
     sine = pose_error(target, actual)
     assert_close(found[:3], sine[:3], rtol=1e-15)
     angle = jnp.linalg.norm(found[3:])
