@@ -103,6 +103,7 @@ def test_branches_and_path(tmp_path):
     assert (tmp_path / "figure.png").stat().st_size > 5000
 
 
+@pytest.mark.slow
 def test_gallery(gallery, tmp_path):
     """Everything at low resolution; what is printed is what is known."""
     figures = gallery.main(tmp_path / "out", samples=24)

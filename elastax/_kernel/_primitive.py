@@ -117,12 +117,13 @@ def _runs_alone(axis_context) -> bool:
     )
 
 
-def _lower_on_cpu(ctx, *operands, program, levels):
+def _lower(ctx, *operands, program, levels):
     context = ctx.module_context
+    on_cpu = tuple(ctx.platforms or context.platforms) == ("cpu",)
     exported = context.lowering_parameters.for_export
     empty = 0 in levels or not any(a.size for a in program.outputs)
     alone = _runs_alone(context.axis_context)
-    if kernels_supported() and alone and not exported and not empty:
+    if kernels_supported() and on_cpu and alone and not exported and not empty:
         try:
             return emit_kernel(ctx, operands, program, levels)
         except NotScalarError:
@@ -152,6 +153,6 @@ batching.primitive_batchers[kernel_p] = _batch
 ad.primitive_jvps[kernel_p] = _push
 ad.primitive_transposes[kernel_p] = _pull
 partial_eval.dce_rules[kernel_p] = _leave_out
-mlir.register_lowering(kernel_p, _lower_written_out)
-# not cached: the lowering looks at how operands are computed; it shares what it makes
-mlir.register_lowering(kernel_p, _lower_on_cpu, platform="cpu", cacheable=False)
+# not cached: the lowering looks at how operands are computed; it shares what it makes.
+# One rule for all platforms: JAX chooses among several in cached lowerings only.
+mlir.register_lowering(kernel_p, _lower, cacheable=False)

@@ -54,7 +54,8 @@ def manipulability(jacobian: Scaled) -> Scalar:
     Args:
         jacobian: shape (rows, joints), in one unit.
     """
-    return jnp.prod(singular_values(jacobian))
+    # not `singular_values`, whose zeros have no slope: here it is that of a branch
+    return jnp.prod(jnp.linalg.svd(jacobian, compute_uv=False))
 
 
 def inverse_condition_number(jacobian: Scaled) -> Scalar:

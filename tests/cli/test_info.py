@@ -63,7 +63,8 @@ def test_kr210(arm):
     stretched = -np.rad2deg(np.arctan2(0.041, 1.2))
     assert f"stretched at A3 = {stretched:.4f} deg" in text
     assert "folded at no angle of A3 within its limits" in text
-    (row,) = re.findall(r"^A1 .*", text, flags=re.MULTILINE)
+    row, denavit = re.findall(r"^A1 .*", text, flags=re.MULTILINE)
+    assert denavit.split()[1:] == ["0", "0.675", "0.35", "-90"]
     assert row.split()[2:9] == [
         "0.0000",
         "0.0000",

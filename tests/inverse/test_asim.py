@@ -165,6 +165,7 @@ def test_parallel_model_of_the_vectors():
     check(tau[0], "tau_a")
 
 
+@pytest.mark.slow
 def test_derivatives_against_nested_jvp(model):
     """One sample of ASIM against the total time derivatives of its equations."""
     factor = 0.05

@@ -63,6 +63,7 @@ def test_ur10e_is_the_makers_table():
     assert_close(arm.upper[2] - arm.lower[2], 2 * np.pi, rtol=1e-15)
 
 
+@pytest.mark.slow
 def test_iiwa_has_the_lengths_of_the_data_sheet():
     arm = arm_from_urdf(IIWA)
     frames = moving_frames(arm.chain, jnp.zeros(7))
@@ -89,6 +90,7 @@ def test_pose_is_that_of_yourdfpy(path):
         assert_close(pose, wanted, rtol=0, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_gradient_by_the_printed_numbers():
     arm = arm_from_urdf(URDF)
     q = jnp.array([0.3, -0.4, 1.1])
@@ -117,6 +119,7 @@ FOLDED = """<robot name="folded">
 </robot>"""
 
 
+@pytest.mark.slow
 def test_fixed_joints_are_folded():
     arm = arm_from_urdf(FOLDED)
     assert arm.chain.kinds == (JointKind.REVOLUTE, JointKind.PRISMATIC)

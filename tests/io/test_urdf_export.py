@@ -93,6 +93,7 @@ GEAR = {"ratio": 100.0, "motor_inertia": 1e-3, "stiffness": 1e6, "damping": 1e2}
 AXIS = {"gear": GEAR, "limits_deg": {"acceleration": 300.0, "jerk": 3000.0}}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("build", [kr210, manutec_r3])
 def test_rigid_robot_comes_back(build):
     """Poses and torques of the robot with its payload, from its URDF."""

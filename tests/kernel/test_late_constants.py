@@ -53,6 +53,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_result_is_that_of_the_definition(case):
     found = jax.jit(CASES[case])(A)

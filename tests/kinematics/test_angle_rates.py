@@ -81,6 +81,7 @@ def test_published_rate_matrix():
     assert_close(rpy_rates(rpy, jnp.array(outputs["omega_base"])), rate, rtol=tol)
 
 
+@pytest.mark.slow
 @each_kind
 def test_angular_velocity_to_third_order(kind):
     build, matrix, _ = KINDS[kind]
@@ -89,6 +90,7 @@ def test_angular_velocity_to_third_order(kind):
     assert_close(found, spins_by_autodiff(build, motion), rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_angular_velocity_of_quaternions():
     motion = motion_of_quaternion()
     found = jax.jit(functools.partial(angular_velocity, quaternion_rate_matrix))(motion)
@@ -170,6 +172,7 @@ def test_analytic_jacobian_in_gimbal_lock():
     assert np.all(np.isfinite(found))
 
 
+@pytest.mark.slow
 def test_gradient_and_batches():
     chain = mixed()
     batch = jnp.asarray(np.random.default_rng(2).uniform(-1, 1, (3, chain.number)))

@@ -43,6 +43,7 @@ def test_characteristic_length():
     assert characteristic_length(gantry()) == pytest.approx(np.hypot(0.05, 0.2))
 
 
+@pytest.mark.slow
 def test_far_origins_are_brought_near():
     chain = disturbed(ur(), 1e-5)
     far = to_dh(chain)

@@ -56,6 +56,7 @@ def slaves(ahead, off=None, relation=RELATION, grasp=GRASP):
     return exact if off is None else exact @ jax.vmap(transform_from_twist)(off)
 
 
+@pytest.mark.slow
 def test_exact_data():
     ahead = masters()
     found = quietly(ahead, slaves(ahead))
@@ -92,6 +93,7 @@ DEGENERATE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", DEGENERATE)
 def test_refuses_what_is_not_determined(case):
     ahead, rank = DEGENERATE[case]
@@ -143,6 +145,7 @@ def test_uncertainty_is_that_of_the_results(noisy):
     assert_close(square.mean(), 12.5, rtol=0.0, atol=1.5)
 
 
+@pytest.mark.slow
 def test_derivative_by_the_measurements():
     """A displacement of all slave poses by their base moves the relation with them."""
     ahead = masters()

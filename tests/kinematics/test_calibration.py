@@ -39,6 +39,7 @@ def small_problem():
     return problem_of(planar(1.0, 0.7), PointInstrument(1e-3), q, names)
 
 
+@pytest.mark.slow
 def test_encoder_offset_is_the_angle_of_its_joint(small_problem):
     (nominal,) = small_problem.measurements
     parameters = small_problem.parameters.select(("theta_2", "a_2"))
@@ -97,6 +98,7 @@ def nearly_parallel():
     )
 
 
+@pytest.mark.slow
 def test_nearly_parallel_axes(nearly_parallel):
     """DH parameters of nearly parallel axes are ill-conditioned, Hayati's are not."""
     arm, dh, hayati = nearly_parallel

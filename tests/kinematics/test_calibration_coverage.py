@@ -63,6 +63,7 @@ def run(problem, true, keys):
 program = jax.jit(run)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arm", (heavy, light))
 def test_intervals_cover_the_true_values(arm, free):
     problem = problem_of(arm()).select(free)
@@ -85,6 +86,7 @@ def test_intervals_cover_the_true_values(arm, free):
     assert abs(np.mean(chi_square) - freedom) < 4 * scatter
 
 
+@pytest.mark.slow
 def test_estimated_variance_takes_students_distribution():
     """Three degrees of freedom: the normal distribution would cover 85 % only."""
     arm, instrument = planar(1.0, 0.7), PointInstrument(1e-4)

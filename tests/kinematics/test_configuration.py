@@ -87,6 +87,7 @@ def test_kuka_elbow_changes_at_the_stretched_forearm(kuka):
         assert int(kuka_configuration(kuka, q).status) == (2 if side > 0 else 0)
 
 
+@pytest.mark.slow
 def test_kuka_round_trip(kuka):
     q = within_limits(kuka, 2000, 0)
     flags, back, reached = kuka_there_and_back(kuka, q)
@@ -97,6 +98,7 @@ def test_kuka_round_trip(kuka):
     assert len(np.unique(flags.turn)) == 64
 
 
+@pytest.mark.slow
 def test_fanuc_round_trip(fanuc_arm):
     q = within_limits(fanuc_arm, 2000, 1)
     # the range of axis 3 overlaps itself by two degrees
@@ -125,6 +127,7 @@ def test_fanuc_text(fanuc_arm, degrees, text):
     assert fanuc_configuration(fanuc_arm, q).text() == text
 
 
+@pytest.mark.slow
 def test_turn_selects_between_angles_a_turn_apart(kuka):
     q = kuka.from_maker(jnp.deg2rad(jnp.array([20.0, -60, 80, 150, 30, -170])))
     pose = forward_kinematics(kuka.chain, q)

@@ -241,6 +241,7 @@ def test_a_prismatic_axis_has_no_place():
         assert len(found.redundant) == 2 and "a_1" in names(found.redundant)
 
 
+@pytest.mark.slow
 def test_whole_chains():
     found = convention_properties(fanuc()).joints
     assert [j.joint for j in found if not j.is_complete] == [2]

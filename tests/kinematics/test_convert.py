@@ -105,6 +105,7 @@ def random_chain(rng):
     return SerialChain.from_rpy(joints[0], np.zeros((5, 3)), joints[1], tool=tool)
 
 
+@pytest.mark.slow
 def test_random_chains():
     rng = np.random.default_rng(2)
     for _ in range(25):

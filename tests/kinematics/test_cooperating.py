@@ -68,6 +68,7 @@ def test_loop_error_is_what_the_slave_has_to_move():
     assert_close(found, off, rtol=1e-13)
 
 
+@pytest.mark.slow
 def test_motion_closes_the_loop(pair, follow):
     """Along the motion of both the loop stays closed to third order in time."""
     motion = follow(pair, Q, QD, QDD, SLAVE)
@@ -146,6 +147,7 @@ def test_refuses_what_is_no_pose():
         Cooperation(planar(1.0), planar(1.0), bent, jnp.eye(4))
 
 
+@pytest.mark.slow
 def test_gradient_and_batches(pair, follow):
     rates = lambda q, qd: slave_motion(pair, q, qd, QDD, SLAVE)[:2]
     assert_gradient(rates, Q, QD)

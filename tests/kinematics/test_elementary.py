@@ -150,6 +150,7 @@ def test_a_product_by_hand():
     assert factors.names == ("y", "turn") and factors.units == ("m", "rad")
 
 
+@pytest.mark.slow
 def test_batches_and_gradient():
     chain = fanuc(1e-3)
     factors, batch = elementary_chain(chain), coordinates(chain, (3,))

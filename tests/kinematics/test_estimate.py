@@ -51,6 +51,7 @@ def small_problem():
     return problem_of(planar(1.0, 0.7), PointInstrument(1e-3), q, names)
 
 
+@pytest.mark.slow
 def test_exact_readings_give_exact_parameters(pose_problem):
     true = deviations(pose_problem.units, size=5e-3)
     found = estimate(measure(pose_problem, true))
@@ -62,6 +63,7 @@ def test_exact_readings_give_exact_parameters(pose_problem):
     assert_close(place(found.chain()), there, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_linear_problem_agrees_with_the_normal_equations(pose_problem):
     # deviations far below the curvature: the estimate is one linear solve
     measured = measure(pose_problem, pose_problem.zero(), jax.random.key(3))
@@ -84,6 +86,7 @@ def test_linear_problem_agrees_with_the_normal_equations(pose_problem):
     assert_close(report.expected, found.standard_deviation(), rtol=1e-2)
 
 
+@pytest.mark.slow
 def test_estimate_is_differentiable_by_the_readings(small_problem):
     (nominal,) = small_problem.measurements
     true = measure(small_problem, deviations(small_problem.units), jax.random.key(1))
@@ -97,6 +100,7 @@ def test_estimate_is_differentiable_by_the_readings(small_problem):
     assert_gradient(found, true.measurements[0].readings, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_jit_and_vmap_agree_with_a_loop(small_problem):
     true = deviations(small_problem.units)
     keys = jax.random.split(jax.random.key(5), 2)
@@ -108,6 +112,7 @@ def test_jit_and_vmap_agree_with_a_loop(small_problem):
     assert_close(together.covariance[1], single.covariance, rtol=1e-6, atol=1e-20)
 
 
+@pytest.mark.slow
 def test_prior_shrinks_towards_its_mean(small_problem):
     measured = measure(small_problem, deviations(small_problem.units))
     tight = GaussianPrior(("a_2",), [1e-8], [3e-4])
@@ -120,6 +125,7 @@ def test_prior_shrinks_towards_its_mean(small_problem):
     assert problem.rows == measured.rows + 1
 
 
+@pytest.mark.slow
 def test_information_of_several_instruments_adds_up(small_problem):
     """Poses of a probe and points of a tracker with noisy encoders, one arm."""
     (points,) = small_problem.measurements
@@ -139,6 +145,7 @@ def test_information_of_several_instruments_adds_up(small_problem):
     assert np.all(found[1].standard_deviation() > exact.standard_deviation())
 
 
+@pytest.mark.slow
 def test_start_far_from_the_solution():
     """A base pose that is wrong by half a metre and 30 degrees."""
     names = tuple(f"base_{c}" for c in ("x", "y", "z", "rx", "ry", "rz"))
@@ -149,6 +156,7 @@ def test_start_far_from_the_solution():
     assert_close(found.deviation, true, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_distances_determine_the_arm():
     anchors = np.array([[2.0, 1, 0], [2, -1, 1], [-1, 2, 0.5]])
     instrument = DistanceInstrument(1e-4, anchors, [0.05, 0.0, 0.1])
@@ -159,6 +167,7 @@ def test_distances_determine_the_arm():
     assert_close(estimate(measure(problem, true)).deviation, true, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_wrong_deviations_show_in_the_probability(small_problem):
     measured = measure(small_problem, small_problem.zero(), jax.random.key(4))
     (part,) = measured.measurements
@@ -183,6 +192,7 @@ def test_wrong_deviations_show_in_the_probability(small_problem):
     assert_close(width(corrected), np.full(3, 2.446912), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_solver_that_gives_up_says_so(small_problem):
     measured = measure(small_problem, deviations(small_problem.units, size=0.05))
     found = estimate(measured, max_steps=2, throw=False)
@@ -191,6 +201,7 @@ def test_solver_that_gives_up_says_so(small_problem):
         estimate(measured, max_steps=2)
 
 
+@pytest.mark.slow
 def test_undetermined_parameter_is_finite(small_problem):
     (nominal,) = small_problem.measurements
     parameters = ChainParameters.of(planar(1.0, 0.7)).select(("a_2", "tool_rx"))
@@ -224,6 +235,7 @@ def test_refusals(pose_problem):
         GaussianPrior(("a_1",), [0.0])
 
 
+@pytest.mark.slow
 def test_readings_that_are_not_finite_raise_at_run_time(pose_problem):
     (part,) = pose_problem.measurements
 

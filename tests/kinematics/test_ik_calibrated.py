@@ -75,6 +75,7 @@ def examine(nominal, chain, q):
 solve = jax.jit(calibrated_inverse_kinematics, static_argnames=("steps", "tolerance"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["fanuc", "kr210"])
 def test_three_steps_reach_rounding(arms, name):
     nominal, chain = arms[name]
@@ -101,6 +102,7 @@ def test_three_steps_reach_rounding(arms, name):
     assert np.max(nearest[np.asarray(own) > 0.1]) < 1e-10
 
 
+@pytest.mark.slow
 def test_near_singular_poses_are_finite_and_marked(arms):
     """Wrist within a degree of aligned, where errors of a tenth of a degree matter."""
     nominal, chain = arms["fanuc"]
@@ -115,6 +117,7 @@ def test_near_singular_poses_are_finite_and_marked(arms):
     assert np.max(np.abs(np.asarray(difference)[reached])) < 1e-8
 
 
+@pytest.mark.slow
 def test_no_errors_no_change(arms):
     nominal, _ = arms["fanuc"]
     pose = forward_kinematics(nominal.chain, jnp.array([0.3, 1.2, -0.4, 0.5, 0.8, -1]))
@@ -124,6 +127,7 @@ def test_no_errors_no_change(arms):
     assert_close(solution.value, starts, rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_iterative_solution_agrees(arms):
     nominal, chain = arms["kr210"]
     q = jnp.array([0.3, -1.0, 1.1, 0.5, 0.9, -0.4])
@@ -135,6 +139,7 @@ def test_iterative_solution_agrees(arms):
     assert float(jnp.min(distance)) < 1e-8
 
 
+@pytest.mark.slow
 def test_error_shrinks_with_every_step(arms):
     nominal, chain = arms["fanuc"]
     pose = forward_kinematics(chain, jnp.array([0.3, 1.2, -0.4, 0.5, 0.8, -1.1]))
@@ -147,6 +152,7 @@ def test_error_shrinks_with_every_step(arms):
         assert after < 100 * before**2 + 1e-14
 
 
+@pytest.mark.slow
 def test_derivatives(arms):
     """By the pose, J^-1; by the parameters, central differences."""
     nominal, chain = arms["fanuc"]
@@ -172,6 +178,7 @@ def test_derivatives(arms):
     assert_gradient(function, joints.a, joints.alpha, chain.base)
 
 
+@pytest.mark.slow
 def test_out_of_reach_is_masked_and_finite(arms):
     nominal, chain = arms["fanuc"]
     pose = jnp.eye(4).at[0, 3].set(9.0)

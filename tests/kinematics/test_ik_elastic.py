@@ -79,6 +79,7 @@ def compare(arm, wrist, q, eta):
     return jax.vmap(one)(q, eta)
 
 
+@pytest.mark.slow
 def test_variants(robot, cases):
     arm, wrist = robot.deformable_arm(), SphericalWrist.from_chain(robot.arm().chain)
     left, (change, start) = compare(arm, wrist, *cases)
@@ -156,6 +157,7 @@ def test_sideways_bending_is_met_by_axis_1():
     assert 1e-4 < float(corrected[0] - q[0]) < 3e-3
 
 
+@pytest.mark.slow
 def test_a_vanishing_lever_is_faded_out():
     """Wrist and tool above axis 1: no correction of axis 1 helps there."""
     arm = simple_arm(height=0.0)
@@ -176,6 +178,7 @@ def test_a_vanishing_lever_is_faded_out():
         assert np.all(np.isfinite(jax.jit(derivative(function))(eta)))
 
 
+@pytest.mark.slow
 def test_gradients():
     arm = simple_arm()
     q = jnp.array([0.4, -0.9, 1.1, 0.2, 0.6, -0.3])
@@ -183,6 +186,7 @@ def test_gradients():
     assert_gradient(lambda q, eta: geometric_correction(arm, q, eta), q, eta)
 
 
+@pytest.mark.slow
 def test_jit_vmap_and_loop_agree():
     arm = simple_arm()
     q = jnp.array([0.4, -0.9, 1.1, 0.2, 0.6, -0.3])

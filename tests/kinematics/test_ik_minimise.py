@@ -29,6 +29,7 @@ def find():
     return jax.jit(lambda t, q: minimise_pose(chain, t, q, **limits, throw=False))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bend", [0.0, 1e-6, 1e-3])
 def test_aligned_hand_axes(find, bend):
     """Axes 4 and 6 aligned, or nearly: reached, with a small change of the joints."""
@@ -69,6 +70,7 @@ def test_limits_are_kept(find):
     assert found.result != PoseResults.successful
 
 
+@pytest.mark.slow
 def test_gradient_is_finite_at_singular_poses(find):
     chain = kuka()
     target = forward_kinematics(chain, WRIST)
@@ -76,6 +78,7 @@ def test_gradient_is_finite_at_singular_poses(find):
     assert np.all(np.isfinite(slopes))
 
 
+@pytest.mark.slow
 def test_gradient():
     q = jnp.array([0.4, 0.3, -0.5, 0.6, 0.9, -0.2])
     goal = forward_kinematics(puma(), q)

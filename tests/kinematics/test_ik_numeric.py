@@ -45,6 +45,7 @@ def test_difference_is_exact_up_to_half_a_turn(angle):
     assert_close(sign * found[3:], vector, rtol=0.0, atol=2e-15)
 
 
+@pytest.mark.slow
 def test_gradient_of_the_difference():
     """At zero and near it the derivative is that of the vector itself."""
     zero = jnp.zeros(3)
@@ -94,6 +95,7 @@ def test_newton_converges_quadratically():
         assert after < 2 * before**2
 
 
+@pytest.mark.slow
 def test_prismatic_joints_and_skew_axes():
     chain, q = mixed(), jnp.array([0.4, 0.2, -0.7, 0.3, 1.1])
     rows = (0, 1, 2, 3, 4, 5)
@@ -103,6 +105,7 @@ def test_prismatic_joints_and_skew_axes():
     assert_close(found.value, q, rtol=0.0, atol=1e-7)  # as above
 
 
+@pytest.mark.slow
 def test_rest_posture_of_a_redundant_arm():
     """Five joints in a plane: the closest solution to the rest posture."""
     chain, rest = planar(*[0.5] * 5), jnp.array([0.3, 0.4, 0.3, 0.4, 0.3])
@@ -139,6 +142,7 @@ def test_rest_posture_of_a_redundant_arm():
     assert_close(matrix.T @ multipliers, gradient, rtol=0.0, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_limits_hold_and_are_left_again():
     """The elbow has to move the other way round."""
     chain = planar(1.0, 0.8)
@@ -159,6 +163,7 @@ def test_limits_hold_and_are_left_again():
     assert abs(slope[0]) < 1e-9 < 1e-2 < slope[1]
 
 
+@pytest.mark.slow
 def test_over_determined_arm_finds_the_nearest_pose():
     """Two joints, three rows of a plane's pose: the least-squares solution."""
     chain = planar(1.0, 0.8)
@@ -186,6 +191,7 @@ def test_over_determined_arm_finds_the_nearest_pose():
         assert jnp.linalg.norm(error) > 0.1
 
 
+@pytest.mark.slow
 def test_out_of_reach():
     """The stretched arm points at the target; the damping keeps it from swinging."""
     chain, far = planar(1.0, 1.0), transform(jnp.eye(3), jnp.array([3.0, 0, 0]))
@@ -220,6 +226,7 @@ def test_singular_distance():
         singular_distance(chain, POSE, rows=(0, 0))
 
 
+@pytest.mark.slow
 def test_jit_is_vmap_is_loop():
     chain = kuka()
     rng = np.random.default_rng(0)

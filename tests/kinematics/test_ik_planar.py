@@ -73,6 +73,7 @@ def test_singular_jacobian_has_no_inverse(bend):
     assert np.all(np.isfinite(gradient))
 
 
+@pytest.mark.slow
 @each_solution
 def test_inverse_of_position(inverse):
     q = jnp.asarray(np.random.default_rng(0).uniform(-np.pi, np.pi, (50, 2)))
@@ -98,6 +99,7 @@ def test_jit_vmap_and_loop_agree(inverse):
     assert batch[1].tolist() == [r.tolist() for _, r in loop]
 
 
+@pytest.mark.slow
 @each_solution
 def test_gradients(inverse):
     place = jnp.array([0.9, 0.6])

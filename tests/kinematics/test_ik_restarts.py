@@ -155,6 +155,7 @@ def test_first_start_and_its_turn(searched):
         assert_close(found.value, q, rtol=0.0, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_out_of_reach():
     arm = ur10e()
     target = transform(jnp.eye(3), jnp.array([5.0, 0.0, 0.0]))
@@ -167,6 +168,7 @@ def test_out_of_reach():
         jax.jit(lambda t: find_pose(arm, t, starts=2))(target)
 
 
+@pytest.mark.slow
 def test_sliding_joints_with_tilted_axes():
     chain = mixed()
     arm = arm_of(chain, np.full(5, -1.5), np.full(5, 1.5))
@@ -175,6 +177,7 @@ def test_sliding_joints_with_tilted_axes():
     assert np.all(solved(arm, found.value, targets))
 
 
+@pytest.mark.slow
 def test_position_only():
     """Seven joints, three rows: poses out of reach, but not their points."""
     arm = iiwa14()
@@ -189,6 +192,7 @@ def test_position_only():
     assert np.all(inside)
 
 
+@pytest.mark.slow
 def test_gradient():
     """The implicit function of a square arm."""
     chain = puma()

@@ -56,6 +56,7 @@ def test_published_redundant():
     assert_close(step(matrix, error, q), case["outputs"]["x"], rtol=case["tol"])
 
 
+@pytest.mark.slow
 def test_damped_steps_are_damped_least_squares():
     rng = np.random.default_rng(2)
     matrix, error = jnp.asarray(rng.standard_normal((4, 6))), jnp.arange(1.0, 5.0)
@@ -90,6 +91,7 @@ def test_step_limit_keeps_the_direction():
     assert_close(limit_step(0 * step, jnp.array(0.1)), 0 * step, rtol=0.0)
 
 
+@pytest.mark.slow
 def test_gradient():
     rng = np.random.default_rng(1)
     matrix, error = jnp.asarray(rng.standard_normal((3, 4))), jnp.arange(1.0, 4.0)

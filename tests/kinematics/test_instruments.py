@@ -71,6 +71,7 @@ def _channels(instrument):
     return 6 if shape == (4, 4) else int(np.prod(shape))
 
 
+@pytest.mark.slow
 def test_distance_at_an_anchor_has_a_finite_slope():
     chain = planar(1.0)
     q = jnp.zeros(1)

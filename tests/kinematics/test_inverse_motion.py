@@ -36,6 +36,7 @@ def seven():
     )
 
 
+@pytest.mark.slow
 def test_published_motion():
     """(3-131) to (3-133); the vector names the wrong readings of (3-127), (3-128)."""
     case = load_vectors("003 (3-109)-(3-113),(3-131)-(3-133)")[0]
@@ -61,6 +62,7 @@ def round_trip(chain, q):
     return inverse_motion(chain, q[0], tool_derivatives(chain, q).twists)
 
 
+@pytest.mark.slow
 def test_round_trip_of_any_order():
     chain, q = fanuc(1e-3), Sines(3).derivatives().at[0].set(REGULAR)
     motion = round_trip(chain, q)
@@ -74,6 +76,7 @@ def test_round_trip_of_any_order():
     assert_close(motion.smallest, smallest, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_batches_and_gradient():
     chain = fanuc(1e-3)
     batch = jnp.stack([Sines(k).derivatives().at[0].set(REGULAR) for k in (1, 2, 3)])
@@ -86,6 +89,7 @@ def test_batches_and_gradient():
     assert_gradient(answer, REGULAR, twists)
 
 
+@pytest.mark.slow
 def test_angles_through_gimbal_lock():
     """A motion in roll-pitch-yaw angles has joint rates where E is singular."""
     chain = fanuc(1e-3)
@@ -102,6 +106,7 @@ def test_angles_through_gimbal_lock():
     assert np.all(np.isfinite(inverse_motion(chain, down, locked.twists).derivatives))
 
 
+@pytest.mark.slow
 def test_redundant_arm():
     """The tool's motion is met; the rates are the smallest in the weighted norm."""
     chain, rng = seven(), np.random.default_rng(4)
@@ -124,6 +129,7 @@ def test_redundant_arm():
     assert_close(plain.derivatives[1], expected, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_more_rows_than_joints():
     """Least squares: the error is orthogonal to what the joints can do."""
     chain, q = planar(0.5, 0.3), jnp.array([0.4, 0.9])
@@ -140,6 +146,7 @@ SINGULAR = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("chain", "pose"), SINGULAR.values(), ids=list(SINGULAR.keys())
 )

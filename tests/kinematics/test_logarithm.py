@@ -120,6 +120,7 @@ def test_second_derivatives_at_zero():
     assert_close(mixed, levi / 2, rtol=0.0, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_gradient_and_batches(maps):
     given = twists()
     for twist in (given[8], given[12]):

@@ -97,6 +97,7 @@ def test_singular_poses(folded):
         assert np.all(np.isfinite(jax.jit(jax.grad(measure))(nothing)))
 
 
+@pytest.mark.slow
 def test_equal_singular_values_have_derivatives():
     for measure in (manipulability, inverse_condition_number, condition_number):
         assert np.all(np.isfinite(jax.jit(jax.grad(measure))(jnp.eye(3))))
@@ -104,6 +105,7 @@ def test_equal_singular_values_have_derivatives():
     assert_close(jax.grad(manipulability)(jnp.eye(3)), jnp.eye(3), rtol=1e-14)
 
 
+@pytest.mark.slow
 def test_gradient_and_batches():
     chain = kuka()
 

@@ -18,6 +18,7 @@ from .calibration_arms import REFLECTORS, heavy, poses
 Q = poses(1)[0]
 
 
+@pytest.mark.slow
 def test_simulated_readings():
     chain, instrument = heavy(), PoseInstrument(1e-4, 1e-4)
 
@@ -45,6 +46,7 @@ def test_offsets_are_added_to_the_encoders():
     assert_close(measured.residuals(chain, offset), np.zeros(3), rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_whitening_of_encoder_noise():
     """Residuals of an arm with noisy encoders are uncorrelated, of variance one."""
     chain, instrument = heavy(), PointInstrument(5e-5, REFLECTORS)

@@ -92,6 +92,7 @@ def errors_of_fit(name, chain, left_out=None):
     return largest
 
 
+@pytest.mark.slow
 @each_arm
 def test_count_and_rank(name):
     make, count = ARMS[name]
@@ -119,6 +120,7 @@ def test_count_is_the_rank_of_all_displacements(name):
     assert np.linalg.matrix_rank(matrix, tol=1e-9) == count
 
 
+@pytest.mark.slow
 @each_arm
 def test_excluded_parameters_are_the_combinations(name):
     minimal = model(name)
@@ -133,6 +135,7 @@ def test_excluded_parameters_are_the_combinations(name):
         assert name not in minimal.parameters.names
 
 
+@pytest.mark.slow
 @each_arm
 def test_real_geometry_is_reproduced(name):
     # every axis, base and tool displaced by millimetres and tenths of a degree
@@ -150,6 +153,7 @@ def test_no_parameter_can_be_spared(name):
         assert errors_of_fit(name, real, left_out)[-1] > 1e-7, left_out
 
 
+@pytest.mark.slow
 def test_conversions_are_reported():
     assert "joints 2, 3)" in model("ur").conversion
     assert "joints 1, 2, 3)" in model("scara").conversion
@@ -176,6 +180,7 @@ def coaxial():
     return SerialChain.from_dh(zero, [0.3, 0.2, 0.1], [0, 0, 0.4], [0, np.pi / 2, 0])
 
 
+@pytest.mark.slow
 def test_coaxial_hinges():
     minimal = minimal_model(coaxial())
     assert minimal.parameters.number == 4 * 3 + 6
@@ -212,6 +217,7 @@ def test_kept_parameters():
         minimal_model(chain, keep=["b_6"])
 
 
+@pytest.mark.slow
 def test_refusals():
     with jax.enable_x64(False), pytest.raises(ValueError, match="double precision"):
         minimal_model(coaxial())

@@ -138,6 +138,7 @@ def test_angles_of_any_order_are_the_exact_motion(fanuc_motion):
     assert_close(rotation_from_rpy(result[0, 3:]), rotation, rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chain", [mixed(), kuka()], ids=["mixed", "kuka"])
 def test_twists_are_derivatives_of_the_jacobian_form(chain):
     r"""(3-109), (3-112): $\dddot y = \ddot J\dot x + 2\dot J\ddot x + J\dddot x$."""
@@ -163,6 +164,7 @@ def test_published_motion():
         assert_close(twists[k, :2], case["outputs"][name], rtol=case["tol"])
 
 
+@pytest.mark.slow
 def test_changing_parameters():
     """(3-104), (3-108) with both Jacobians; constant parameters change nothing."""
     chain = fanuc(1e-3)
@@ -214,6 +216,7 @@ def test_angles_and_twists_are_inverse():
     assert_close(motion.twists[0, 3:], E @ rates, rtol=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_gimbal_lock(side):
     """Exact where the lost direction is at rest; finite with its gradients anyway."""
@@ -234,6 +237,7 @@ def test_gimbal_lock(side):
     assert all(np.all(np.isfinite(x)) for x in jax.tree.leaves((backward, forward)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("chain", "pose"),
     [(kuka(), np.zeros(6)), (fanuc(1e-3), np.array([0.3, 1.2, -0.4, 0.5, 0, 0.2]))],
@@ -244,6 +248,7 @@ def test_singular_poses_have_gradients(chain, pose):
     assert_gradient(tool_derivatives, chain, q)
 
 
+@pytest.mark.slow
 def test_gradients_and_batches():
     chain, batch = fanuc(1e-3), jnp.stack([Sines(k).derivatives() for k in (3, 4, 5)])
     full = lambda chain, q: rpy_derivatives(tool_derivatives(chain, q))

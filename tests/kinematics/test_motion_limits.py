@@ -29,6 +29,7 @@ def sines(amplitudes=(1.0, 0.5), rate=np.pi, orders=5):
     return jnp.asarray(motion)
 
 
+@pytest.mark.slow
 def test_ratios_are_amplitudes_over_limits():
     check = check_motion(LIMITS, sines())
     amplitudes = np.array([1.0, 0.5]) * np.pi ** np.arange(4)[:, None]
@@ -86,6 +87,7 @@ def test_table_says_what_is_exceeded():
     assert "50.0 % at sample 50" in text and "all limits hold" in text
 
 
+@pytest.mark.slow
 def test_gradients_and_batches():
     motion = sines()[:, ::20]
     one = np.ones(2)

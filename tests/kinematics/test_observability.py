@@ -75,6 +75,7 @@ def test_reading_jacobian_of_a_planar_arm():
     assert_close(found, expected, rtol=1e-12, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_index_of_an_experiment():
     parameters = ChainParameters.of(heavy()).select(("a_2", "theta_3", "d_4"))
     q = poses(6)

@@ -154,6 +154,7 @@ def test_derivative_in_lock_is_that_of_kept_angles():
     assert_close(slopes, jnp.eye(3)[:, :2], rtol=0.0, atol=1e-15)
 
 
+@pytest.mark.slow
 @each_kind
 def test_gradient_and_batches(kind):
     build, solutions, _, _ = KINDS[kind]

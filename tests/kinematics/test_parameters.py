@@ -86,6 +86,7 @@ def test_ends_and_rotations_move_in_their_own_frames():
     assert_close(moved.joints.rotation[1], chain.joints.rotation[1], rtol=0.0)
 
 
+@pytest.mark.slow
 @each_chain
 def test_jacobian_by_differences(name):
     chain = CHAINS[name]
@@ -104,6 +105,7 @@ def test_jacobian_by_differences(name):
     assert_close(parameter_jacobian(parameters, q), expected, rtol=0.0, atol=2e-11)
 
 
+@pytest.mark.slow
 def test_gradient():
     chain = CHAINS["mixed"]
     q, zero = coordinates(chain), jnp.zeros(ChainParameters.of(chain).number)
@@ -111,11 +113,13 @@ def test_gradient():
     assert_gradient(pose, chain, zero, q)
 
 
+@pytest.mark.slow
 def test_gradient_of_the_jacobian():
     some = ChainParameters.of(CHAINS["hayati"]).select(["beta_1", "a_2", "tool_rx"])
     assert_gradient(parameter_jacobian, some, Q)
 
 
+@pytest.mark.slow
 def test_jit_vmap_and_loop_agree():
     parameters = ChainParameters.of(CHAINS["rpy"]).select(["rpy_2_x", "tool_rz"])
     poses = jnp.asarray(np.random.default_rng(0).uniform(-2, 2, (3, 5)))
@@ -125,6 +129,7 @@ def test_jit_vmap_and_loop_agree():
     assert_close(stack, loop, rtol=1e-13, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_selection():
     parameters = ChainParameters.of(puma())
     some = parameters.select(["tool_z", "a_2"])

@@ -26,12 +26,14 @@ def arm():
     return DeformableArm.rigid(puma())
 
 
+@pytest.mark.slow
 def test_rigid_arm_is_the_chain(arm):
     pose, matrix = arm.tool(Q, NOTHING)
     assert_close(pose, forward_kinematics(arm.chain, Q), rtol=0.0, atol=1e-15)
     assert_close(matrix, jacobian(arm.chain, Q), rtol=0.0, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_each_step_squares_the_error(arm):
     target = forward_kinematics(arm.chain, Q + 0.05)
     errors = []
@@ -123,6 +125,7 @@ def test_derivative_is_the_inverse_jacobian(arm, derivative):
     assert_close(matrix, jnp.eye(6), rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_gradient_by_parameters_and_deformations():
     chain = kuka()
     coupling = np.concatenate([np.eye(6), np.eye(6)[:, [1, 2]]], axis=1)
@@ -140,6 +143,7 @@ def test_gradient_by_parameters_and_deformations():
     assert_gradient(function, chain.joints.position, eta, Q[3])
 
 
+@pytest.mark.slow
 def test_singular_pose_stays_finite():
     """Wrist aligned: the Jacobian has no inverse."""
     arm = DeformableArm.rigid(kuka())

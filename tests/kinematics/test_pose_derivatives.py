@@ -115,6 +115,7 @@ def test_terms_are_all_there(number, order):
 SEQUENCES = [(0,), (3, 0), (1, 3), (0, 2, 2), (4, 2, 0, 0), (3, 3, 0, 2, 1), (2,) * 5]
 
 
+@pytest.mark.slow
 def test_any_order_is_nested_jvps():
     factors, q = small(), jnp.array([0.3, -0.2])
 
@@ -153,6 +154,7 @@ def test_any_order_is_nested_jvps():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chain", [mixed(), fanuc(1e-3)], ids=["mixed", "fanuc"])
 def test_first_and_second_derivatives(chain):
     """By the joints against autodiff of the chain, by the rest against any order."""
@@ -195,6 +197,7 @@ def test_jacobian_by_joints_and_parameters():
     assert_close(actual[:, np.array(columns)], expected, rtol=0, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_gradients():
     factors, q = small(), jnp.array([0.3, -0.2])
     orders = jnp.array([1, 1, 0, 2, 0])

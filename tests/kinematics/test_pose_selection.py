@@ -28,6 +28,7 @@ NAMES = ("theta_2", "a_2", "alpha_2", "theta_3", "a_3", "alpha_3", "theta_4", "d
 EXCHANGED = (ProductIndex(), NoiseAmplificationIndex(), MeanVarianceIndex())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("index", EXCHANGED, ids=lambda i: type(i).__name__)
 def test_better_than_random_choices(index):
     parameters = ChainParameters.of(heavy()).select(NAMES)
@@ -58,6 +59,7 @@ def test_better_than_random_choices(index):
     assert_close(again.indices, chosen.indices, rtol=0)
 
 
+@pytest.mark.slow
 def test_finds_the_best_of_all_choices():
     """A problem small enough to try every choice."""
     parameters = ChainParameters.of(planar(1.0, 0.7)).select(("a_1", "a_2", "theta_2"))
@@ -101,6 +103,7 @@ def test_random_joints_lie_within_the_limits():
     assert np.all(np.max(q, axis=0) > upper - 0.03 * (upper - lower))
 
 
+@pytest.mark.slow
 def test_refusals():
     parameters = ChainParameters.of(planar(1.0, 0.7)).select(("a_1", "a_2"))
     run = lambda number, names=("a_1", "a_2"): select_poses(

@@ -37,6 +37,7 @@ row_of = eqx.filter_jit(branch_index)
 solve = jax.jit(inverse_kinematics)
 
 
+@pytest.mark.slow
 @each_arm
 def test_every_row_has_its_posture(arms, name):
     """The eight rows are the eight postures, whatever the senses of the axes."""
@@ -115,6 +116,7 @@ def test_mounted_upside_down(arms):
     assert answers(classify(hanging, q)) == answers(classify(arm, q))
 
 
+@pytest.mark.slow
 def test_vmap_agrees_with_the_loop(arms):
     arm = arms["kr210"]
     q = jnp.asarray(np.random.default_rng(2).uniform(-3, 3, (10, 6)))

@@ -3,6 +3,7 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 import scipy.spatial.transform
 from elastax.kinematics import (
     continuous_quaternions,
@@ -54,6 +55,7 @@ def test_previous_chooses_the_sign():
     assert_close(opposite, -quaternion, rtol=0.0)
 
 
+@pytest.mark.slow
 def test_signs_along_a_path():
     """Two whole turns about an axis: one turn brings the quaternion to its negative."""
     axis = jnp.array([0.6, 0.0, 0.8])

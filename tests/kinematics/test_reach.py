@@ -4,6 +4,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from elastax.kinematics import (
     JointKind,
     SerialChain,
@@ -46,6 +47,7 @@ def test_limits_are_met():
     assert_close(shifted.largest, expected[1], rtol=1e-13)
 
 
+@pytest.mark.slow
 def test_reach_of_a_wrist_centre():
     """From axis 2 the two links, from the base the offsets as well."""
     chain, wide = wrist_arm(), jnp.full(6, np.pi)
@@ -60,6 +62,7 @@ def test_reach_of_a_wrist_centre():
     assert_close(far.largest, jnp.array(expected), rtol=1e-10)
 
 
+@pytest.mark.slow
 def test_no_sample_is_beyond():
     for chain in (kuka(), mixed()):
         wide = jnp.full(chain.number, 1.5)
@@ -73,6 +76,7 @@ def test_no_sample_is_beyond():
             assert_close(jnp.linalg.norm(pose[:3, 3]), length, rtol=1e-13, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_extent_along_a_direction():
     found = eqx.filter_jit(extent)(
         planar(0.5, 0.4), -WIDE, WIDE, jnp.array([3.0, 4, 0])
@@ -102,6 +106,7 @@ def test_sliding_joints():
     assert_close(found.q_least, jnp.array([0.0, 0.5, 0.0]), rtol=0.0, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_gradient():
     """By the lengths, and by the limit that is met; zero where nothing is gained."""
 
@@ -120,6 +125,7 @@ def test_gradient():
     assert np.all(np.isfinite(found))
 
 
+@pytest.mark.slow
 def test_batches():
     chain = planar(0.5, 0.4)
     limits = jnp.array([[1.0, 2.0], [0.5, 0.7]])

@@ -2,6 +2,7 @@
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from elastax.kinematics import hard_and_soft, weighted_correction
 
 from tests.helpers import assert_close, assert_gradient, load_vectors
@@ -56,6 +57,7 @@ def test_dependent_rows_stay_finite():
     assert_close(multipliers[0], multipliers[1], rtol=1e-12)  # of smallest norm
 
 
+@pytest.mark.slow
 def test_gradient():
     given, _, _ = published()
     assert_gradient(

@@ -26,6 +26,7 @@ def law(chain, q, twist, damping, weights, length):
     return light.T @ jnp.linalg.solve(gram, scale * twist)
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_of_the_law():
     """A redundant arm with large damping: each one is the total derivative."""
     chain, rng = seven(), np.random.default_rng(4)
@@ -59,6 +60,7 @@ def test_without_damping_it_is_the_inverse():
     assert_close(actual, expected, rtol=0, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_singular_pose_gradient_and_batches():
     chain = planar(0.5, 0.3)
     stretched = jnp.array([0.4, 0.0])

@@ -75,6 +75,7 @@ def test_folded_back_wrist():
     assert_close(forward_kinematics(arm, solutions[2]), pose, rtol=0.0, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_agrees_with_the_general_closed_form(chain):
     """All branches of random reachable poses, and the same masks."""
     q = jnp.asarray(np.random.default_rng(0).uniform(-np.pi, np.pi, (1000, 6)))
@@ -135,6 +136,7 @@ def alone(unknowns):
     return {(int(i), int(j)): int(np.argmax(unknowns[i, j])) for i, j in single}
 
 
+@pytest.mark.slow
 def test_the_search_finds_the_steps_of_the_text(chain):
     """Which equation holds one unknown only, step after step."""
     # no inversion: every element of the position holds several
@@ -162,6 +164,7 @@ def test_planar_arm_is_separated_as_well():
     assert unknowns[0, 3].tolist() == [True, True]
 
 
+@pytest.mark.slow
 def test_gradient(chain):
     q = jnp.array([0.3, 1.2, -0.4, 0.5, 0.8, -1.1])
     joints = chain.joints

@@ -68,6 +68,7 @@ def test_redundant_and_short_arms():
     assert not found.is_singular and found.full == 2
 
 
+@pytest.mark.slow
 def test_parameters_of_parallel_axes():
     parameters = ChainParameters.of(ur(), base=False, tool=False)
     poses = generic_poses(ur(), 12)

@@ -131,6 +131,7 @@ def test_compliance_of_a_lever():
     assert_close(found, expected, rtol=1e-14, atol=1e-18)
 
 
+@pytest.mark.slow
 def test_stiffness_inverts_the_compliance():
     chain = kuka()
     stiff = eqx.filter_jit(tool_stiffness)(chain, Q, STIFFNESS)
@@ -153,6 +154,7 @@ def test_rigid_joints_and_singular_poses():
         eqx.filter_jit(tool_stiffness)(chain, Q.at[4].set(0.0), STIFFNESS)
 
 
+@pytest.mark.slow
 def test_compliance_under_load_is_that_of_the_equilibrium():
     """Second route: the equilibrium of springs and load, differentiated by the load."""
     chain, soft = kuka(), STIFFNESS / 100
@@ -185,6 +187,7 @@ def test_gimbal_lock_of_generalised_forces():
         eqx.filter_jit(wrench_from_generalised)(rpy, generalised)
 
 
+@pytest.mark.slow
 def test_gradient_and_batches():
     chain = kuka()
     small = planar(0.5, 0.4, 0.3)

@@ -69,6 +69,7 @@ def arm():
     return factors, deviations, jnp.asarray(units), q
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [0, 1, 2, 3])
 def test_bounds_hold_and_are_not_loose(arm, order):
     factors, deviations, sizes, q = arm
@@ -97,6 +98,7 @@ def test_bounds_hold_and_are_not_loose(arm, order):
         assert np.all(guess > 0.9 * largest), f"{name}: estimate/actual too small"
 
 
+@pytest.mark.slow
 def test_majorant_is_met_by_parallel_axes():
     """A stretched planar arm whose deviations add up: all norms are attained."""
     factors = elementary_chain(planar(0.5, 0.3, 0.2), base=False, tool=False)
@@ -127,6 +129,7 @@ def test_remainder_has_its_order(arm):
     assert_close(whole / half, 8.0, rtol=0.1)
 
 
+@pytest.mark.slow
 def test_gradients_and_batches():
     factors, q = small(), jnp.array([0.3, -0.2])
     deviation = jnp.array([0.03, -0.02, 0.05, 0.01, -0.04])

@@ -45,6 +45,7 @@ FOUR = np.array([[0.1, 0, 0], [0.9, 0.2, 0], [-0.3, 0.8, 0.4], [0, -0.7, 1.0]])
 # ------------------------------------------------------------------- tool centre point
 
 
+@pytest.mark.slow
 def test_four_points_give_the_tool_centre():
     found = tool_centre_point(touching(FOUR))
     assert_close(found.position, TIP, rtol=0, atol=1e-14)
@@ -69,6 +70,7 @@ def test_tool_centre_is_the_least_squares_solution():
     assert_close(estimated.covariance, covariance * 1e8 * (rest @ rest) / 6, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_uncertainty_of_the_tool_centre():
     def run(key):
         noise = 1e-4 * jax.random.normal(key, (4, 3))
@@ -85,10 +87,12 @@ def test_uncertainty_of_the_tool_centre():
     assert_close(deviation, size, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_tool_centre_gradient():
     assert_gradient(lambda p: tool_centre_point(p).position, touching(FOUR))
 
 
+@pytest.mark.slow
 def test_degenerate_touches_are_refused():
     with pytest.raises(ValueError, match="different orientations, but have one"):
         tool_centre_point(touching(np.zeros((4, 3))))
@@ -116,6 +120,7 @@ def test_frame_from_points():
         frame_from_points(point(0.0, 0, 0), point(0.4, 0, 0), point(-0.2, 0, 0))
 
 
+@pytest.mark.slow
 def test_tool_frame_from_three_touches():
     tips = jnp.array([[0.0, 0, 0], [0.1, 0, 0], [0.05, 0.2, 0]])
     in_flange = tips @ TOOL[:3, :3].T + TOOL[None, :3, 3]
@@ -144,6 +149,7 @@ mount = eqx.filter_jit(mounting_pose)
 simulate = eqx.filter_jit(Measurements.simulated)
 
 
+@pytest.mark.slow
 def test_mounting_pose():
     pose = transform_from_twist(jnp.array([3.0, -1, 0.4, 0.3, -2.0, 1.0]))
     arm = heavy()
@@ -169,6 +175,7 @@ def test_mounting_pose():
     assert np.sum(start**2) > 2 * found.estimate.chi_square()
 
 
+@pytest.mark.slow
 def test_mounting_pose_is_a_calibration_of_the_base():
     arm = heavy()
     measured = simulate(

@@ -63,6 +63,7 @@ def test_published_propagation():
     assert_close(found, outputs["S_y"], rtol=tol)
 
 
+@pytest.mark.slow
 def test_implicit_model_is_the_explicit_one_solved():
     """Two equations in two outputs, of which the solution is known."""
     mix = jnp.array([[2.0, 1.0], [-1.0, 1.5]])
@@ -88,6 +89,7 @@ def test_worst_case_is_met_by_signs():
     assert_close(worst_case(sensitivity, bounds), corners.max(axis=1), rtol=1e-14)
 
 
+@pytest.mark.slow
 def test_sensitivity_of_a_planar_arm():
     """Closed form of the lengths, and the joints' own columns."""
     chain, q = planar(0.5, 0.4), jnp.array([0.3, 0.8])
@@ -99,6 +101,7 @@ def test_sensitivity_of_a_planar_arm():
     assert_close(found[2:, 2:], np.zeros((4, 2)), rtol=0.0, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_covariance_is_that_of_samples(parameters, bounds, sampled):
     """20000 samples know a standard deviation to 0.5 %, a correlation to 0.007."""
     steps = quantisation(RESOLUTION)
@@ -115,6 +118,7 @@ def test_covariance_is_that_of_samples(parameters, bounds, sampled):
     assert np.all(np.abs(deviations.mean(axis=0)) < 0.03 * scale)
 
 
+@pytest.mark.slow
 def test_bounds_hold_for_small_deviations_and_not_for_large(
     parameters, bounds, sampled
 ):
@@ -153,6 +157,7 @@ def test_first_order_ends_where_the_second_grows(parameters, bounds, sampled):
     assert 0.08 < shift(large) < 0.2
 
 
+@pytest.mark.slow
 def test_gradient_and_batches(parameters, bounds):
     chosen = ChainParameters.of(planar(0.5, 0.4), base=False, tool=False)
     q, steps = jnp.array([0.3, 0.8]), jnp.array([1e-3, 2e-3])

@@ -58,6 +58,7 @@ def test_points_are_in_the_ring():
     assert_close(points[7], one, rtol=1e-14, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_section_of_a_wrist(arm):
     """Reachable where the wrist centre is between the two circles of the arm."""
     corner = jnp.array([0.1, 0.0, -1.4])
@@ -81,6 +82,7 @@ def test_section_of_a_wrist(arm):
     assert expected.max() == 8 and expected.min() == 0
 
 
+@pytest.mark.slow
 def test_limits_and_whole_turns(arm):
     """A pose counts if one branch, but for whole turns, is within the limits."""
     q = jnp.array([0.3, -1.1, 1.4, 0.4, 0.8, -0.6])
@@ -113,6 +115,7 @@ def test_sampled_section_counts_every_point_once():
     assert_close(found.best, jnp.array([[2.0], [3.0]]), rtol=0.0)
 
 
+@pytest.mark.slow
 def test_section_from_samples_is_the_ring():
     """Cells well inside the ring of a planar arm are hit, those outside never."""
     chain, limit = planar(0.5, 0.4), jnp.full(2, np.pi)
@@ -133,6 +136,7 @@ def test_section_from_samples_is_the_ring():
     assert counts.sum() == 20000
 
 
+@pytest.mark.slow
 def test_gradient_by_the_pose(arm):
     """The best measure is differentiable where it can be reached, zero elsewhere."""
     low, high = wide()

@@ -50,6 +50,7 @@ def test_shares_are_the_smallest():
     assert_close(jax.grad(cost)(first), 0.0, rtol=0.0, atol=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bend", [0.0, np.pi], ids=["aligned", "opposed"])
 @pytest.mark.parametrize("chain", [fanuc(1e-3), kuka()], ids=["fanuc", "kuka"])
 def test_aligned_wrist_shares_the_turn(chain, bend):
@@ -93,6 +94,7 @@ def test_extreme_weights():
         assert_close(q, before.at[moved].add(0.5), rtol=0.0, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_turning_in_the_singular_pose_moves_both_axes():
     """The tool turns about its own axis with the wrist aligned all the way."""
     chain = kuka()
@@ -120,6 +122,7 @@ def through_the_singular_pose(samples):
     return path, poses, q, chain
 
 
+@pytest.mark.slow
 def test_continuity_through_the_singular_pose():
     largest = []
     for samples in (41, 81, 161):
@@ -136,6 +139,7 @@ def test_continuity_through_the_singular_pose():
     assert_close(largest[1] / largest[2], 2.0, rtol=0.05)
 
 
+@pytest.mark.slow
 def test_paths_in_one_call():
     """Whole paths, one start each, as a batch and as a loop."""
     chain = kuka()

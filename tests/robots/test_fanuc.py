@@ -58,6 +58,7 @@ def test_tool_down(arm):
     assert_close(pose[:3, 3], [1.592, 0.0, 1.3 - 0.215], rtol=0.0, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_every_branch_of_many_poses(arm):
     """10,000 random reachable poses, all branches, in one call."""
     wrist = SphericalWrist.from_chain(arm.chain)
@@ -90,6 +91,7 @@ def test_every_branch_of_many_poses(arm):
     assert np.max(nearest) < 1e-7
 
 
+@pytest.mark.slow
 def test_poses_out_of_reach_are_masked(arm):
     """Twice as far as the arm reaches: no branch, no NaN."""
     wrist = SphericalWrist.from_chain(arm.chain)
