@@ -23,6 +23,7 @@ from elastax.dynamics import forward_dynamics, inverse_dynamics, simulate
 from elastax.inverse import ASIM
 from elastax.kinematics import (
     SphericalWrist,
+    find_pose,
     forward_kinematics,
     inverse_kinematics,
     jacobian,
@@ -65,6 +66,7 @@ def cases() -> Iterator[tuple[str, Callable[[], GPUCase]]]:
     yield "inverse_kinematics", lambda: _branches(1 << 16)
     yield "rigid_inverse_dynamics", lambda: _rigid(1 << 18)
     yield "elastic_forward_dynamics", lambda: _elastic(1 << 16)
+    yield "find_pose", lambda: _search(1 << 14)
     yield "asim_offline", lambda: _asim(1024)
     yield "closed_loop_simulation", lambda: _simulation(128)
     yield "locked_frequencies", lambda: _frequencies(1 << 14)
@@ -106,6 +108,27 @@ def _branches(count: int) -> GPUCase:
         (poses,),
         1e-9,
         "eight branches of the inverse and their poses",
+    )
+
+
+def _search(count: int) -> GPUCase:
+    arm = kr210().arm()
+    share = np.random.default_rng(1).uniform(size=(count, arm.chain.number))
+    q = arm.lower + jnp.asarray(share) * (arm.upper - arm.lower)
+    poses = jax.jit(jax.vmap(lambda x: forward_kinematics(arm.chain, x)))(q)
+
+    def reached(arm, pose):
+        """Pose of what is found, zero if nothing is."""
+        found = find_pose(arm, pose, starts=32, throw=False)
+        tool = forward_kinematics(arm.chain, found.value)
+        return jnp.where(found.reached, tool, 0.0)
+
+    return GPUCase(
+        reached,
+        arm,
+        (poses,),
+        1e-5,  # each side stops within 1e-6
+        "numeric inverse within the limits, up to 32 starts",
     )
 
 
