@@ -22,7 +22,7 @@ from tests import systems
 from tests.helpers import assert_close, assert_gradient, load_vectors
 
 
-SIZES = [pytest.param(3, 2, False, marks=pytest.mark.slow), (8, 12, True)]
+SIZES = [(3, 2, False), pytest.param(8, 12, True, marks=pytest.mark.slow)]
 
 
 @pytest.mark.parametrize(("axes", "elastic", "counterbalance"), SIZES)

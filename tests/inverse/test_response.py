@@ -133,6 +133,7 @@ def test_series_of_the_response():
     assert_close(DAMPING * xddd, fdd - stiffness * xdd - bend * xd**2, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_gradient():
     def end(spring, damping, x):
         return step_on(spring, damping, x, 0.2, 0.03, 2)

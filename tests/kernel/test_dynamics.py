@@ -64,7 +64,7 @@ def derivatives(function, robot, first, direction):
     }
 
 
-QUICK = ("forward_dynamics", "forward_kinematics", "jacobian")
+QUICK = ("forward_kinematics", "jacobian")
 
 
 @pytest.mark.parametrize(
