@@ -41,6 +41,7 @@ def test_geometry_is_that_of_the_kinematics():
     functions = (forward_kinematics, jacobian, moving_frames)
     pose, columns, frames = jax.jit(lambda c, x: [f(c, x) for f in functions])(chain, q)
     # rounding
+    # two orders of summation over six joints of a few metres: rounding of both
     assert_close(here.tool, pose, rtol=0, atol=1e-14)
     assert_close(jacobian_of(chain, here), columns, rtol=0, atol=1e-14)
     assert_close(here.axes, frames.axis, rtol=0, atol=1e-14)
@@ -51,6 +52,7 @@ def test_lines_and_angles():
     assert_close(distance(0 * x, x, 2 * z + y, y), 2.0, rtol=0)
     assert_close(distance(0 * x, x, 3 * x + 2 * z, x), 2.0, rtol=0)
     # what lies along the axis does not count
+    # one arctangent
     assert_close(angle_between(x + 5 * z, y - z, z), np.pi / 2, rtol=1e-15)
 
 
@@ -76,6 +78,7 @@ def test_kr210(arm):
 
 def test_arm_of_a_robot_has_limits_of_the_chain(arm):
     robot = kr210()
+    # one product and one sum: four roundings
     assert_close(arm.from_maker(robot.limits.lower)[0], arm.upper[0], rtol=1e-15)
     assert_close(arm.from_maker(robot.limits.lower)[1:], arm.lower[1:], rtol=1e-15)
     q = jnp.linspace(-1, 1, 6)

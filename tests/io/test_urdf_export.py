@@ -120,6 +120,7 @@ def test_rigid_robot_comes_back(build):
     ends = lambda r: np.sort(
         [r.from_maker(r.limits.lower), r.from_maker(r.limits.upper)], axis=0
     )
+    # the angles of a file pass through a product and a sum each way
     assert_close(ends(again), ends(robot), rtol=1e-14)
 
 
