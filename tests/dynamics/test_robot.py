@@ -23,6 +23,7 @@ def test_arm_has_the_limits_of_the_maker(robot):
     for k in range(6):
         ends = sorted([float(arm.to_maker(x)[k]) for x in (arm.lower, arm.upper)])
         wanted = [float(robot.limits.lower[k]), float(robot.limits.upper[k])]
+        # an angle passes through a product and a sum each way
         assert_close(ends, wanted, rtol=1e-14)
 
 
