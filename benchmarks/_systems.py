@@ -7,7 +7,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from elastax.control import CascadeMotorControl
-from elastax.drivetrain import CoulombViscousFriction, DriveTrain, LinearStiffness
+from elastax.drivetrain import (
+    CoulombViscousFriction,
+    DriveTrain,
+    LinearStiffness,
+    Motor,
+)
 from elastax.dynamics import (
     Axis,
     Body,
@@ -96,7 +101,7 @@ def chain_robot(axes: int, elastic: int = 0) -> ElasticRobot:
     viscous = lambda value: CoulombViscousFriction(value * one, 0.0 * one, one)
     drives = DriveTrain(
         ratio=100.0 * one,
-        motor_inertia=1e-3 * one,
+        motor=Motor(1e-3 * one),
         stiffness=LinearStiffness(2e4 * one),
         damping=20.0 * one,
         motor_friction=viscous(5.0),

@@ -97,7 +97,9 @@ def streamed(name: str, effort: Effort) -> Iterator[dict]:
     """One sample at a time, as a controller asks."""
     robot, inverse = kr210(), INVERSES[name]
     reference = swing(SAMPLES, robot.axes)
-    samples = np.asarray(reference.derivatives)[: inverse.order() + 1].swapaxes(0, 1)
+    samples = np.asarray(reference.derivatives)[: inverse.order(robot) + 1].swapaxes(
+        0, 1
+    )
     both = lambda: compile_step(inverse, robot, DT)
     stream, seconds = _timed(both)
     gc.freeze()
@@ -152,7 +154,7 @@ def derivative(name: str, use: str, effort: Effort) -> Iterator[dict]:
     """Derivatives of a step by all parameters, the state and the sample."""
     robot, inverse = kr210(), INVERSES[name]
     reference = swing(2, robot.axes)
-    sample = jnp.asarray(reference.derivatives[: inverse.order() + 1, 0])
+    sample = jnp.asarray(reference.derivatives[: inverse.order(robot) + 1, 0])
     state = jax.jit(lambda m, s: inverse.init(m, s, DT))(robot, sample)
 
     def pushed(robot, state, sample):

@@ -6,6 +6,7 @@ import numpy as np
 from elastax.drivetrain import (
     CoulombViscousFriction,
     DriveTrain,
+    Motor,
     SpringCounterbalance,
 )
 from elastax.dynamics import (
@@ -36,8 +37,18 @@ class TorqueControl(AbstractMotorController):
     def motors(self, setpoint, theta, thetad):
         return theta, thetad
 
-    def torque(self, setpoint, theta, thetad, inertia, load):
+    def torque(self, setpoint, theta, thetad, inertia, load, memory):
         return setpoint.tau_m
+
+    @property
+    def states(self) -> int:
+        return 0
+
+    def rates(self, setpoint, theta, thetad, memory):
+        return memory
+
+    def resting_memory(self, setpoint, load, inertia):
+        return jnp.zeros((0, load.shape[0]))
 
     def resting_motors(self, setpoint, load, inertia):
         return setpoint.theta
@@ -68,7 +79,7 @@ def drive_train(
         spring = LinearStiffness(full(stiffness))
     return DriveTrain(
         ratio=full(ratio),
-        motor_inertia=full(motor_inertia),
+        motor=Motor(full(motor_inertia)),
         stiffness=spring,
         damping=full(damping),
         motor_friction=friction(full(motor_friction)),
@@ -253,7 +264,7 @@ def random_robot(
         parts.append(offset())
     drives = DriveTrain(
         ratio=rng.uniform(-90.0, -40.0, axes),
-        motor_inertia=rng.uniform(1e-3, 3e-3, axes),
+        motor=Motor(rng.uniform(1e-3, 3e-3, axes)),
         stiffness=CubicStiffness(rng.uniform(1e3, 4e3, axes), np.full(axes, 20.0)),
         damping=rng.uniform(5.0, 30.0, axes),
         motor_friction=friction(rng.uniform(1.0, 5.0, axes), 3.0, 8.0),

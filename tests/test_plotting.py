@@ -9,7 +9,12 @@ import pytest
 from elastax import plotting
 from elastax.analysis import judge
 from elastax.control import Run
-from elastax.drivetrain import CoulombViscousFriction, DriveTrain, LinearStiffness
+from elastax.drivetrain import (
+    CoulombViscousFriction,
+    DriveTrain,
+    LinearStiffness,
+    Motor,
+)
 from elastax.dynamics import (
     Axis,
     Body,
@@ -42,7 +47,7 @@ def plant() -> ElasticRobot:
         parts.append(Offset((1.0, 0.0, 0.0)))
     drives = DriveTrain(
         ratio=np.array([-100.0, 50.0]),
-        motor_inertia=np.ones(2),
+        motor=Motor(np.ones(2)),
         stiffness=LinearStiffness(np.full(2, 1e5)),
         damping=np.ones(2),
         motor_friction=CoulombViscousFriction(np.zeros(2), np.zeros(2), np.ones(2)),

@@ -212,7 +212,7 @@ def run_all(
 def stream_cost(name, robot, reference, progress) -> dict[str, float]:
     """Latency of single steps [s] over the motion, repeated to 10,000 steps."""
     inverse = INVERSES[name]
-    samples = np.swapaxes(reference.derivatives[: inverse.order() + 1], 0, 1)
+    samples = np.swapaxes(reference.derivatives[: inverse.order(robot) + 1], 0, 1)
     progress.say(f"compiling the step of {name} ...")
     streamed = compile_step(inverse, robot, float(reference.dt))
     progress.say(f"timing the step of {name} ...")

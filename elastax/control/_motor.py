@@ -1,14 +1,17 @@
 """Controllers at the motors."""
 
 import equinox as eqx
+import jax.numpy as jnp
 
 from .._checks import check_fields, check_values
 from .._custom_types import PerJoint, Scalar, as_real
-from ..dynamics import AbstractMotorController, MotorSetpoint
+from ..dynamics import AbstractMotorController, ControllerMemory, MotorSetpoint
 
 
 class IdealMotorControl(AbstractMotorController):
     """The motors follow the commanded angles exactly, whatever torque it takes.
+
+    A lag of the motors has no effect on such motors, but on the torque that is shown.
 
     References:
         [Reiner2010] section 3.8.3, figures 3.23 and 3.24.
@@ -26,6 +29,7 @@ class IdealMotorControl(AbstractMotorController):
         thetad: PerJoint,
         inertia: PerJoint,
         load: PerJoint,
+        memory: ControllerMemory,
     ) -> PerJoint:
         return inertia * setpoint.thetadd + load
 
@@ -33,6 +37,24 @@ class IdealMotorControl(AbstractMotorController):
         self, setpoint: MotorSetpoint, load: PerJoint, inertia: PerJoint
     ) -> PerJoint:
         return setpoint.theta
+
+    @property
+    def states(self) -> int:
+        return 0
+
+    def rates(
+        self,
+        setpoint: MotorSetpoint,
+        theta: PerJoint,
+        thetad: PerJoint,
+        memory: ControllerMemory,
+    ) -> ControllerMemory:
+        return memory
+
+    def resting_memory(
+        self, setpoint: MotorSetpoint, load: PerJoint, inertia: PerJoint
+    ) -> ControllerMemory:
+        return jnp.zeros((0, load.shape[0]), load.dtype)
 
 
 class CascadeMotorControl(AbstractMotorController):
@@ -70,6 +92,7 @@ class CascadeMotorControl(AbstractMotorController):
         thetad: PerJoint,
         inertia: PerJoint,
         load: PerJoint,
+        memory: ControllerMemory,
     ) -> PerJoint:
         speed = setpoint.thetad - thetad
         angle = setpoint.theta - theta
@@ -81,3 +104,21 @@ class CascadeMotorControl(AbstractMotorController):
     ) -> PerJoint:
         stiffness = inertia * self.speed_bandwidth * self.position_gain
         return setpoint.theta + (setpoint.tau_m - load) / stiffness
+
+    @property
+    def states(self) -> int:
+        return 0
+
+    def rates(
+        self,
+        setpoint: MotorSetpoint,
+        theta: PerJoint,
+        thetad: PerJoint,
+        memory: ControllerMemory,
+    ) -> ControllerMemory:
+        return memory
+
+    def resting_memory(
+        self, setpoint: MotorSetpoint, load: PerJoint, inertia: PerJoint
+    ) -> ControllerMemory:
+        return jnp.zeros((0, load.shape[0]), load.dtype)

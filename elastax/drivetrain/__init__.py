@@ -6,14 +6,22 @@ from ..structure import (
     LimitedStiffness as LimitedStiffness,
     LinearStiffness as LinearStiffness,
 )
+from ._branch import (
+    AbstractGearBranch as AbstractGearBranch,
+    AbstractSwitchingBranch as AbstractSwitchingBranch,
+    RelaxationBranch as RelaxationBranch,
+)
 from ._counterbalance import (
     AbstractCounterbalance as AbstractCounterbalance,
     GasCounterbalance as GasCounterbalance,
     SpringCounterbalance as SpringCounterbalance,
 )
-from ._drivetrain import DriveTrain as DriveTrain
+from ._drivetrain import DriveTrain as DriveTrain, GearMemory as GearMemory
 from ._friction import (
     AbstractFriction as AbstractFriction,
     CoulombViscousFriction as CoulombViscousFriction,
     TwoScaleFriction as TwoScaleFriction,
 )
+from ._mesh import AbstractMesh as AbstractMesh
+from ._motor import Motor as Motor
+from ._transmission_error import TransmissionError as TransmissionError

@@ -1,51 +1,75 @@
-"""Drive trains of all axes: motor, gear and friction, referred to the output side."""
+"""Drive trains of all axes, assembled from parts and referred to the output side."""
+
+import dataclasses
+from typing import Any
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
 
 from .._checks import check_fields, check_values
 from .._custom_types import PerJoint, as_real
 from .._taylor import compose
 from ..structure import AbstractStiffness
+from ._branch import AbstractGearBranch
 from ._friction import AbstractFriction
+from ._mesh import AbstractMesh
+from ._motor import Motor
+from ._transmission_error import TransmissionError
+
+
+GearMemory = Float[Array, "states joints"]
 
 
 class DriveTrain(eqx.Module):
-    r"""Motor, friction and elastic gear of every axis.
+    r"""Motor, friction, teeth and elastic gear of every axis.
 
     Angles and torques are those of the output side: $\varphi = \varphi_m / i$,
-    $\tau = i\,\tau_m$, $\Theta = i^2 J$. The gear transmits
-    $\tau_g = k(q - \theta) + d\,(\dot q - \dot\theta)$, which acts on the motor and,
-    with the opposite sign, on the link. The gyroscopic coupling of the rotors to the
-    structure is neglected, as in the text.
+    $\tau = i\,\tau_m$, $\Theta = i^2 J$. From the motor to the link:
+
+    | part | law |
+    |---|---|
+    | `motor` | $\Theta\ddot\theta = \tau_m - \tau_r(\dot\theta) - \tau_A$, with a lag $T_m\dot\tau_m = \tau_{cmd} - \tau_m$ if it has one |
+    | `motor_friction` | $\tau_r(\dot\theta)$ |
+    | `mesh` | $\tau_A$ for the torque that the teeth hand on; without one they are equal |
+    | `transmission_error` | $\varphi_B(\theta)$, the angle behind the teeth; $\theta$ itself without one |
+    | `stiffness`, `damping`, `branch` | $\tau_g = k(x) + d\,\dot x + b(x, z)$ with the torsion $x = q - \varphi_B$ and the memory z of the branch |
+    | `joint_friction` | $\tau_{ra}(\dot q)$ |
+
+    $\tau_g$ acts on the motor and, with the opposite sign, on the link. The gyroscopic
+    coupling of the rotors to the structure is neglected, as in the text. Parts are
+    swapped by `dataclasses.replace`, or for a robot by `robot.with_drives`.
 
     Attributes:
         ratio: gear ratios motor / output, shape (joints,); the sign is kept.
-        motor_inertia: rotor inertias on the motor side [kg m^2].
+        motor: rotor, torque constant and lag of the motors, on the motor side.
         stiffness: gear stiffness laws [N m], or `None` for rigid gears.
         damping: gear damping [N m s/rad].
         motor_friction: friction of motor and gear input, as a function of the motor's
             speed on the output side.
         joint_friction: friction behind the gear, as a function of the joint's speed.
+        branch: element with a memory in parallel to the gear's spring, or `None`.
+        mesh: losses in the teeth that depend on their load, or `None`.
+        transmission_error: of the teeth, or `None` for an ideal ratio.
 
     References:
-        [Reiner2010] (2.3), (2.7), (2.9), (2.38), section 2.3.1 for the referral.
-    """
+        [Reiner2010] (2.2) to (2.19), (2.38), section 2.3.1 for the referral.
+    """  # noqa: E501
 
     ratio: PerJoint = eqx.field(converter=as_real)
-    motor_inertia: PerJoint = eqx.field(converter=as_real)
+    motor: Motor
     stiffness: AbstractStiffness | None
     damping: PerJoint = eqx.field(converter=as_real)
     motor_friction: AbstractFriction
     joint_friction: AbstractFriction
+    branch: AbstractGearBranch | None = None
+    mesh: AbstractMesh | None = None
+    transmission_error: TransmissionError | None = None
 
     def __check_init__(self):
         check_fields(self)
         check_values("`ratio` must not be zero", self.ratio, self.ratio != 0)
-        check_values(
-            "`motor_inertia` must be positive [kg m^2]",
-            self.motor_inertia,
-            self.motor_inertia > 0,
-        )
         check_values(
             "gear `damping` must be positive [N m s/rad]: the inverse drive train "
             "divides by it",
@@ -58,30 +82,114 @@ class DriveTrain(eqx.Module):
         """Number of axes."""
         return self.ratio.shape[0]
 
+    @property
+    def memory_states(self) -> int:
+        """Number of states per axis that the gear's branch remembers."""
+        return 0 if self.branch is None else self.branch.states
+
+    @property
+    def extra_order(self) -> int:
+        """Derivatives that the exact inverse needs beyond those of an ideal motor."""
+        return 0 if self.motor.lag is None else 1
+
     def reflected_inertia(self) -> PerJoint:
         r"""Rotor inertia on the output side, $\Theta = i^2 J$ [kg m^2]."""
-        return self.ratio**2 * self.motor_inertia
+        return self.ratio**2 * self.motor.inertia
 
-    def gear_torque(self, torsion: PerJoint, torsion_rate: PerJoint) -> PerJoint:
-        """Torque of spring and damper [N m] at `torsion` = q - theta [rad].
+    def gear_torque(
+        self,
+        torsion: PerJoint,
+        torsion_rate: PerJoint,
+        memory: GearMemory | None = None,
+    ) -> PerJoint:
+        """Torque of spring, damper and branch [N m].
+
+        Args:
+            torsion: joint angle minus the angle behind the teeth [rad].
+            torsion_rate: its rate [rad/s].
+            memory: of the branch, shape (states, joints); only with a branch.
 
         References:
-            [Reiner2010] (2.7), (2.9) and the linear damper of section 2.3.2.
+            [Reiner2010] (2.7), (2.9), (2.19), the linear damper of section 2.3.2.
         """
-        if self.stiffness is None:
-            raise ValueError("a rigid gear has no torque of its own: use elastic gears")
-        return compose(self.stiffness.torque, torsion) + torsion_rate * self.damping
+        spring = _spring(self)
+        torque = compose(spring.torque, torsion) + torsion_rate * self.damping
+        if self.branch is None:
+            return torque
+        return torque + self.branch.torque(spring, torsion, _given(memory))
+
+    def memory_rates(
+        self, torsion: PerJoint, torsion_rate: PerJoint, memory: GearMemory
+    ) -> GearMemory:
+        """Rates of the branch's memory; empty without a branch."""
+        if self.branch is None:
+            return memory
+        return self.branch.rates(torsion, torsion_rate, memory)
+
+    def resting_memory(self, torsion: PerJoint) -> GearMemory:
+        """Memory of a gear that was never loaded beyond `torsion` and rests there."""
+        if self.branch is None:
+            return jnp.zeros((0, self.number), torsion.dtype)
+        return self.branch.rest(torsion)
+
+    def resting_torque(self, torsion: PerJoint) -> PerJoint:
+        """Torque of the gear [N m] at rest, loaded once up to `torsion` [rad]."""
+        spring = _spring(self)
+        if self.branch is None:
+            return spring.torque(torsion)
+        memory = self.branch.rest(torsion)
+        return spring.torque(torsion) + self.branch.torque(spring, torsion, memory)
+
+    def behind_teeth(self, theta: Any) -> Any:
+        """Angle behind the teeth [rad] at the motor angle `theta`, array or series."""
+        if self.transmission_error is None:
+            return theta
+        return compose(self.transmission_error.output_angle, theta)
+
+    def before_teeth(self, angle: Any) -> Any:
+        """Motor angle [rad] at the angle behind the teeth, array or series."""
+        if self.transmission_error is None:
+            return angle
+        return compose(self.transmission_error.motor_angle, angle)
+
+    def motion_behind_teeth(
+        self, theta: PerJoint, thetad: PerJoint
+    ) -> tuple[PerJoint, PerJoint]:
+        """Angle [rad] and speed [rad/s] behind the teeth."""
+        if self.transmission_error is None:
+            return theta, thetad
+        angle = self.transmission_error.output_angle(theta)
+        return angle, thetad / self._speed_ratio(angle)
+
+    def motor_load(self, gear: PerJoint, angle: PerJoint, thetad: PerJoint) -> PerJoint:
+        """What gear and friction ask of the motor: `h_m` [N m].
+
+        Args:
+            gear: torque of the gear, `gear_torque` [N m].
+            angle: behind the teeth [rad].
+            thetad: motor speed [rad/s].
+
+        References:
+            [Reiner2010] (2.3), (2.6c), (2.11), (2.38).
+        """
+        return self.motor_friction.torque(thetad) + self._drive(-gear, angle, thetad)
+
+    def _drive(self, load, angle, thetad):
+        """Torque that drives the teeth when they hand on `load`."""
+        if self.transmission_error is not None:
+            load = load / self._speed_ratio(angle)  # no loss: equal powers
+        if self.mesh is None:
+            return load
+        return self.mesh.drive_torque(load, thetad)
+
+    def _speed_ratio(self, angle):
+        """Motor speed over the speed behind the teeth, one for an ideal ratio."""
+        slope = self.transmission_error.motor_angle
+        return jax.jvp(slope, (angle,), (jnp.ones_like(angle),))[1]
 
     def rigid(self) -> "DriveTrain":
         """The same drive trains with rigid gears."""
-        return DriveTrain(
-            self.ratio,
-            self.motor_inertia,
-            None,
-            self.damping,
-            self.motor_friction,
-            self.joint_friction,
-        )
+        return dataclasses.replace(self, stiffness=None, branch=None)
 
     def to_motor_torque(self, torque: PerJoint) -> PerJoint:
         """Motor-side torque [N m] of an output-side one."""
@@ -98,3 +206,17 @@ class DriveTrain(eqx.Module):
     def to_output_angle(self, angle: PerJoint) -> PerJoint:
         """Output-side angle [rad] (or speed) of a motor-side one."""
         return angle / self.ratio
+
+
+def _spring(drives: DriveTrain) -> AbstractStiffness:
+    if drives.stiffness is None:
+        raise ValueError("a rigid gear has no torque of its own: use elastic gears")
+    return drives.stiffness
+
+
+def _given(memory: GearMemory | None) -> GearMemory:
+    if memory is None:
+        raise ValueError(
+            "the gear has a branch with a memory: hand its states over as `memory`"
+        )
+    return memory

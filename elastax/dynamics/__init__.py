@@ -6,7 +6,11 @@ from ._block_form import (
     forward_dynamics as forward_dynamics,
 )
 from ._bodies import RigidBodies as RigidBodies, no_bodies as no_bodies
-from ._closed_loop import AbstractMotorController as AbstractMotorController
+from ._closed_loop import (
+    AbstractMotorController as AbstractMotorController,
+    ControllerMemory as ControllerMemory,
+    LoopState as LoopState,
+)
 from ._command import (
     CommandInterpolant as CommandInterpolant,
     MotorCommand as MotorCommand,
@@ -16,6 +20,7 @@ from ._command import (
 from ._dh import dh_link as dh_link
 from ._energy import (
     dissipated_power as dissipated_power,
+    gear_energy as gear_energy,
     kinetic_energy as kinetic_energy,
     potential_energy as potential_energy,
 )
@@ -47,6 +52,7 @@ from ._robot import (
 from ._screws import multibody as multibody
 from ._simulate import (
     SimulationResult as SimulationResult,
+    resting_loop as resting_loop,
     resting_state as resting_state,
     simulate as simulate,
 )

@@ -6,7 +6,9 @@ from jaxtyping import Array, Float
 
 from .._custom_types import PerElastic, PerJoint
 from .._kernel import kernel
+from ..drivetrain import GearMemory
 from ._forces import applied_forces
+from ._gear_loads import gear_loads, rigid_motor_load
 from ._linearised import body_accelerations
 from ._robot import ElasticRobot
 from ._screws import multibody
@@ -46,6 +48,7 @@ def equations_of_motion(
     qd: PerJoint,
     etad: PerElastic,
     thetad: PerJoint,
+    memory: GearMemory | None = None,
 ) -> EquationsOfMotion:
     """Blocks of the equations of motion.
 
@@ -55,6 +58,11 @@ def equations_of_motion(
         eta, etad: elastic coordinates and velocities, shape (elastic,).
         theta, thetad: motor angles and velocities on the output side, shape (axes,);
             without effect if the gears are rigid.
+        memory: of the gears' branch, shape (states, axes); only where they have one.
+
+    Raises:
+        ValueError: rigid gears with a mesh or a transmission error, or gears with a
+            branch without its memory.
 
     References:
         [Reiner2010] (2.38). The gyroscopic coupling of the rotors is neglected there
@@ -65,40 +73,38 @@ def equations_of_motion(
     joint, structure = applied_forces(robot, q, eta, qd, etad)
     inertia = robot.drives.reflected_inertia()
     h_a, h_e = bias[:n] + joint, bias[n:] + structure
-    friction = robot.drives.motor_friction.torque
     if not robot.has_elastic_gears:
         empty = jnp.zeros((0,), q.dtype)
         return EquationsOfMotion(
             mass[:n, :n] + jnp.diag(inertia),
             mass[:n, n:],
             mass[n:, n:],
-            h_a + friction(qd),
+            h_a + rigid_motor_load(robot, qd),
             h_e,
             empty,
             empty,
         )
-    gear = robot.drives.gear_torque(q - theta, qd - thetad)
+    gear, h_m = gear_loads(robot, q, theta, qd, thetad, memory)
     return EquationsOfMotion(
         mass[:n, :n],
         mass[:n, n:],
         mass[n:, n:],
         h_a + gear,
         h_e,
-        friction(thetad) - gear,
+        h_m,
         inertia,
     )
 
 
 @kernel
-def _loads(robot: ElasticRobot, q, eta, theta, qd, etad, thetad, tau_m):
+def _loads(robot: ElasticRobot, q, eta, theta, qd, etad, thetad, tau_m, memory):
     """Forces on joints and structure besides those of the bodies, on the motors."""
     joint, structure = applied_forces(robot, q, eta, qd, etad)
-    friction = robot.drives.motor_friction.torque
     if not robot.has_elastic_gears:
-        return jnp.concatenate([tau_m - friction(qd) - joint, -structure]), tau_m
-    gear = robot.drives.gear_torque(q - theta, qd - thetad)
-    motor = tau_m - friction(thetad) + gear
-    return jnp.concatenate([-joint - gear, -structure]), motor
+        driven = tau_m - rigid_motor_load(robot, qd) - joint
+        return jnp.concatenate([driven, -structure]), tau_m
+    gear, h_m = gear_loads(robot, q, theta, qd, thetad, memory)
+    return jnp.concatenate([-joint - gear, -structure]), tau_m - h_m
 
 
 @kernel
@@ -111,19 +117,21 @@ def forward_dynamics(
     etad: PerElastic,
     thetad: PerJoint,
     tau_m: PerJoint,
+    memory: GearMemory | None = None,
 ) -> tuple[PerJoint, PerElastic, PerJoint]:
     """Accelerations of joints, structure and motors under the motor torque `tau_m`.
 
     Args:
         robot: the robot.
-        q, eta, theta, qd, etad, thetad: as for `equations_of_motion`.
+        q, eta, theta, qd, etad, thetad, memory: as for `equations_of_motion`.
         tau_m: motor torques on the output side [N m], shape (axes,).
 
     Returns:
         qdd (axes,), etadd (elastic,), thetadd (axes,) [rad/s^2]; for rigid gears
         thetadd equals qdd.
     """
-    force, motor = _loads(robot, q, eta, theta, qd, etad, thetad, tau_m)
+    state = q, eta, theta, qd, etad, thetad
+    force, motor = _loads(robot, *state, tau_m, memory)
     rotors = None if robot.has_elastic_gears else robot.drives.reflected_inertia()
     acceleration = body_accelerations(robot, q, eta, qd, etad, force, rotors)
     qdd, etadd = acceleration[: robot.axes], acceleration[robot.axes :]

@@ -7,7 +7,9 @@ from jaxtyping import Array, Float
 
 from .._custom_types import PerElastic, PerJoint, Scalar
 from .._taylor import leading
+from ..drivetrain import GearMemory
 from ..kinematics import moving_frames
+from ._gear_loads import gear_loads, rigid_motor_load
 from ._robot import ElasticRobot
 
 
@@ -76,8 +78,8 @@ def potential_energy(
     """
     _, com = body_poses(robot, q, eta)
     energy = -jnp.sum(robot.all_bodies().mass * (com @ robot.gravity))
-    if robot.drives.stiffness is not None:
-        energy = energy + jnp.sum(robot.drives.stiffness.potential(q - theta))
+    if robot.has_elastic_gears:
+        energy = energy + gear_energy(robot, q, theta)
     if robot.structure_stiffness is not None:
         energy = energy + jnp.sum(robot.structure_stiffness.potential(eta))
     if robot.counterbalance is not None:
@@ -85,32 +87,42 @@ def potential_energy(
     return energy
 
 
+def gear_energy(robot: ElasticRobot, q: PerJoint, theta: PerJoint) -> Scalar:
+    """Energy [J] in the springs of elastic gears; what branches store is left out."""
+    drives = robot.drives
+    if drives.stiffness is None:
+        return jnp.zeros((), q.dtype)
+    return jnp.sum(drives.stiffness.potential(q - drives.behind_teeth(theta)))
+
+
 def dissipated_power(
     robot: ElasticRobot,
     q: PerJoint,
+    theta: PerJoint,
     qd: PerJoint,
     etad: PerElastic,
     thetad: PerJoint,
+    memory: GearMemory | None = None,
 ) -> Scalar:
     """Power [W] lost in friction, gears, structure and the counterbalance's rod.
 
     Args:
         robot: the robot.
-        q: joint angles [rad], shape (axes,); they place the counterbalance.
+        q, theta: joint and motor angles [rad], shape (axes,).
         qd, etad, thetad: velocities of joints, structure and motors.
+        memory: of the gears' branch, shape (states, axes); only where they have one.
+            What flows into a branch counts as lost, also what it will give back.
     """
     drives = robot.drives
-    if not robot.has_elastic_gears:
-        thetad = qd
-    slip = qd - thetad
     rod = jnp.zeros((), qd.dtype)
     if robot.counterbalance is not None:
         k = robot.counterbalanced_axis
         rod = -robot.counterbalance.damping_torque(q[k], qd[k]) * qd[k]
-    return (
-        rod
-        + jnp.sum(drives.motor_friction.torque(thetad) * thetad)
-        + jnp.sum(drives.joint_friction.torque(qd) * qd)
-        + jnp.sum(drives.damping * slip**2)
-        + jnp.sum(robot.structure_damping * etad**2)
-    )
+    lost = rod + jnp.sum(robot.structure_damping * etad**2)
+    lost = lost + jnp.sum(drives.joint_friction.torque(qd) * qd)
+    if not robot.has_elastic_gears:
+        return lost + jnp.sum(rigid_motor_load(robot, qd) * qd)
+    gear, h_m = gear_loads(robot, q, theta, qd, thetad, memory)
+    energy = lambda q, theta: gear_energy(robot, q, theta)
+    _, stored = jax.jvp(energy, (q, theta), (qd, thetad))
+    return lost + jnp.sum(gear * qd) + jnp.sum(h_m * thetad) - stored

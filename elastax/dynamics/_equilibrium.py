@@ -5,6 +5,7 @@ import jax.numpy as jnp
 
 from .._custom_types import PerElastic, PerJoint
 from .._kernel import kernel
+from ._gear_loads import resting_loads
 from ._newton_euler import inverse_dynamics
 from ._robot import ElasticRobot
 
@@ -37,14 +38,13 @@ def static_equilibrium(
         q (axes,) and eta (elastic,) [rad].
     """
     n = robot.axes
-    zero = jnp.zeros_like(theta)
     rest = jnp.zeros((robot.elastic,), theta.dtype)
 
     def residual(x):
         q, eta = x[:n], x[n:]
         joint, structure = static_load(robot, q, eta)
         if robot.has_elastic_gears:
-            joint = joint + robot.drives.gear_torque(q - theta, zero)
+            joint = joint + resting_loads(robot, q, theta)[0]
         else:
             joint = q - theta
         return jnp.concatenate([joint, structure])

@@ -4,7 +4,9 @@ import jax
 import jax.numpy as jnp
 
 from .._custom_types import PerElastic, PerJoint
-from ._energy import kinetic_energy, potential_energy
+from ..drivetrain import GearMemory
+from ._energy import gear_energy, kinetic_energy, potential_energy
+from ._gear_loads import gear_loads, rigid_motor_load
 from ._robot import ElasticRobot
 
 
@@ -19,6 +21,7 @@ def lagrange_forces(
     qdd: PerJoint,
     etadd: PerElastic,
     thetadd: PerJoint,
+    memory: GearMemory | None = None,
 ) -> tuple[PerJoint, PerElastic, PerJoint]:
     r"""Generalised forces that a motion needs, by Lagrange's equations.
 
@@ -30,6 +33,7 @@ def lagrange_forces(
         robot: the robot.
         q, eta, theta, qd, etad, thetad, qdd, etadd, thetadd: the motion; for rigid
             gears the motors follow the joints and the last force is zero.
+        memory: of the gears' branch, shape (states, axes); only where they have one.
 
     Returns:
         Forces of joints, structure and motors [N m].
@@ -55,11 +59,13 @@ def lagrange_forces(
         lost_q = lost_q.at[k].add(-robot.counterbalance.damping_torque(q[k], qd[k]))
     lost_eta = robot.structure_damping * etad
     if robot.has_elastic_gears:
-        gear = drives.damping * (qd - thetad)
-        lost_q = lost_q + gear
-        lost_theta = drives.motor_friction.torque(thetad) - gear
+        # the springs are in the potential, the rest of the drive trains is not
+        gear, h_m = gear_loads(robot, q, theta, qd, thetad, memory)
+        stored = jax.grad(lambda x: gear_energy(robot, *x), argnums=0)((q, theta))
+        lost_q = lost_q + gear - stored[0]
+        lost_theta = h_m - stored[1]
     else:
-        lost_q = lost_q + drives.motor_friction.torque(qd)
+        lost_q = lost_q + rigid_motor_load(robot, qd)
         lost_theta = jnp.zeros_like(qd)
     lost = (lost_q, lost_eta, lost_theta)
     return jax.tree.map(lambda r, f, d: r - f + d, rate, force, lost)

@@ -9,13 +9,21 @@ from jaxtyping import Array, Float, Int
 
 from .._custom_types import PerElastic, PerJoint, Scalar, Times
 from .._kernel import kernel
-from ._closed_loop import AbstractMotorController, observe, rates
+from ._closed_loop import (
+    AbstractMotorController,
+    LoopState,
+    observe,
+    rates,
+    state_shapes,
+)
 from ._command import CommandInterpolant, MotorCommand, MotorSetpoint
 from ._equilibrium import static_load
+from ._gear_loads import resting_loads
 from ._robot import ElasticRobot
 
 
 _RATE = 10.0  # [1/s], absolute tolerance of speeds over that of angles
+_TORQUE = 1e6  # [N m/rad], the same of torques
 _NEWTON_STEPS = 16  # of the resting state; four reach rounding
 _CHECKPOINTS = 512  # one per step of 0.5 s; longer motions are recomputed in parts
 
@@ -93,8 +101,9 @@ def simulate(
         step: first and largest step [s]; the time between the command's samples unless
             given. It has no derivative.
         rtol: relative tolerance of a step.
-        atol: absolute tolerance of a step, of the angles [rad]; that of the speeds is
-            10 times larger [rad/s].
+        atol: absolute tolerance of a step, of the angles [rad]; that of the speeds and
+            of a controller's own states is 10 times larger [rad/s], that of the torques
+            of motors with a lag a million times [N m].
         max_steps, throw: as in diffrax.
         adjoint: as in diffrax; forward sensitivities (`jax.jvp`, `jax.jacfwd`) need
             `diffrax.ForwardMode()`.
@@ -110,12 +119,10 @@ def simulate(
     step = command.times[1] - command.times[0] if step is None else jnp.asarray(step)
     step = jax.lax.stop_gradient(step)
     setpoint = CommandInterpolant(command)
-    n, m = robot.axes, robot.elastic
     if stepsize_controller is None:
-        ones = jnp.ones((n + m + n,), times.dtype)
         stepsize_controller = dfx.PIDController(
             rtol=rtol,
-            atol=jnp.concatenate([atol * ones, _RATE * atol * ones]),
+            atol=atol * jnp.asarray(_scales(robot, controller), times.dtype),
             pcoeff=0.1,
             icoeff=0.3,
             dtmax=step,
@@ -124,15 +131,14 @@ def simulate(
     def vector_field(t, x, _):
         return rates(robot, controller, setpoint(t), x)
 
-    q, eta, theta = resting_state(robot, setpoint(times[0]), controller)
-    rest = jnp.zeros((n + m + n,), q.dtype)
+    start = resting_loop(robot, setpoint(times[0]), controller)
     solution = dfx.diffeqsolve(
         dfx.ODETerm(vector_field),
         solver,
         t0=times[0],
         t1=times[-1],
         dt0=step,
-        y0=jnp.concatenate([q, eta, theta, rest]),
+        y0=start.vector(),
         saveat=dfx.SaveAt(ts=times),
         stepsize_controller=stepsize_controller,
         max_steps=max_steps,
@@ -144,6 +150,33 @@ def simulate(
         times, solution.ys
     )
     return SimulationResult(times, *observed, steps=solution.stats["num_steps"])
+
+
+def _scales(robot: ElasticRobot, controller: AbstractMotorController) -> np.ndarray:
+    """Absolute tolerances of the parts of the state, in those of the angles."""
+    parts = (1.0, 1.0, 1.0, _RATE, _RATE, _RATE, 1.0, _TORQUE, _RATE)
+    shapes = state_shapes(robot, controller)
+    return np.concatenate([np.full(np.prod(s), p) for s, p in zip(shapes, parts)])
+
+
+def resting_loop(
+    robot: ElasticRobot, setpoint: MotorSetpoint, controller: AbstractMotorController
+) -> LoopState:
+    """The whole state of robot and loop at rest under a setpoint."""
+    q, eta, theta = resting_state(robot, setpoint, controller)
+    _, load = resting_loads(robot, q, theta)
+    drives, still = robot.drives, jnp.zeros_like(q)
+    return LoopState(
+        q,
+        eta,
+        theta,
+        still,
+        jnp.zeros_like(eta),
+        still,
+        drives.resting_memory(q - drives.behind_teeth(theta)),
+        load[:0] if drives.motor.lag is None else load,
+        controller.resting_memory(setpoint, load, drives.reflected_inertia()),
+    )
 
 
 def resting_state(
@@ -166,9 +199,9 @@ def _unrest(robot, setpoint, controller, x):
     n, m = robot.axes, robot.elastic
     q, eta, theta = jnp.split(x, [n, n + m])
     joint, structure = static_load(robot, q, eta)
-    gear = robot.drives.gear_torque(q - theta, jnp.zeros_like(q))
+    gear, load = resting_loads(robot, q, theta)
     inertia = robot.drives.reflected_inertia()
-    motors = controller.resting_motors(setpoint, -gear, inertia)
+    motors = controller.resting_motors(setpoint, load, inertia)
     return jnp.concatenate([joint + gear, structure, theta - motors])
 
 

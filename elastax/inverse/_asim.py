@@ -31,11 +31,11 @@ from ._correction import AbstractCorrection, PositionCorrection, correct
 from ._damping_signal import AbstractDampingSignal, FilteredDamping
 from ._drive import (
     DriveState,
-    advance_torsion,
+    advance_gear,
     gear_spring,
+    gears_along,
     motor_motion,
-    resting_torsion,
-    torsions_along,
+    resting_gear,
 )
 from ._response import advance, response
 
@@ -51,7 +51,7 @@ def default_damping() -> FilteredDamping:
 
 class _State(eqx.Module):
     eta: PerElastic
-    forcing: Float[Array, "3 elastic"]
+    forcing: Float[Array, "terms elastic"]
     drive: DriveState
     damping: object
     dt: Scalar
@@ -76,8 +76,8 @@ class ASIM(AbstractInverse):
     limiter: CorrectionLimiter | None = None
     iterations: int = eqx.field(static=True, default=1)
 
-    def order(self) -> int:
-        return 4
+    def order(self, model: ElasticRobot) -> int:
+        return 4 + model.drives.extra_order
 
     def init(
         self, model: ElasticRobot, sample: Derivatives, dt: Scalar | float
@@ -87,9 +87,10 @@ class ASIM(AbstractInverse):
         dt = jnp.asarray(dt, sample.dtype)
         smallest = self._smallest(model, sample[0], eta)
         damping = self.damping.init(smallest, dt)
-        factor, _ = self.damping.step(damping, smallest, jnp.zeros_like(dt), 3)
+        order = 3 + model.drives.extra_order
+        factor, _ = self.damping.step(damping, smallest, jnp.zeros_like(dt), order)
         _, load = self._loaded(model, sample, forcing, eta, factor)
-        drive = DriveState(resting_torsion(model.drives, load), load.coefficients)
+        drive = DriveState(resting_gear(model.drives, load), load.coefficients)
         return _State(eta, forcing.coefficients, drive, damping, dt, jnp.zeros_like(dt))
 
     def step(
@@ -100,18 +101,16 @@ class ASIM(AbstractInverse):
             model, state.eta, Series(state.forcing), forcing, state.elapsed
         )
         factor, damping = self.damping.step(
-            state.damping, self._smallest(model, sample[0], eta), state.elapsed, 3
+            state.damping,
+            self._smallest(model, sample[0], eta),
+            state.elapsed,
+            3 + model.drives.extra_order,
         )
         q, load = self._loaded(model, sample, forcing, eta, factor)
-        torsion = advance_torsion(
-            model.drives,
-            state.drive.torsion,
-            Series(state.drive.load),
-            load,
-            state.elapsed,
-        )
-        output = motor_motion(model.drives, q, load, torsion, eta)
-        drive = DriveState(torsion, load.coefficients)
+        before = Series(state.drive.load)
+        gear = advance_gear(model.drives, state.drive.gear, before, load, state.elapsed)
+        output = motor_motion(model.drives, q, load, gear, eta)
+        drive = DriveState(gear, load.coefficients)
         return output, _State(
             eta, forcing.coefficients, drive, damping, state.dt, state.dt
         )
@@ -119,21 +118,21 @@ class ASIM(AbstractInverse):
     def feedforward(self, model: ElasticRobot, reference: Reference) -> MotorCommand:
         check_reference(self, model, reference)
         gear_spring(model.drives)
-        samples, dt = samples_of(self, reference), reference.dt
+        samples, dt = samples_of(self, model, reference), reference.dt
         forcing = jax.vmap(lambda s: structure_torque(model, s).coefficients)(samples)
         eta = deformations_along(model, forcing, dt)
         smallest = jax.vmap(lambda s, e: self._smallest(model, s[0], e))(samples, eta)
-        factors = self.damping.along(smallest, dt, 3)
+        factors = self.damping.along(smallest, dt, 3 + model.drives.extra_order)
 
         def loaded(sample, torque, eta, factor):
             q, load = self._loaded(model, sample, Series(torque), eta, Series(factor))
             return q.coefficients, load.coefficients
 
         q, loads = jax.vmap(loaded)(samples, forcing, eta, factors)
-        torsions = torsions_along(model.drives, loads, dt)
+        gears = gears_along(model.drives, loads, dt)
         outputs = jax.vmap(
-            lambda q, f, x, e: motor_motion(model.drives, Series(q), Series(f), x, e)
-        )(q, loads, torsions, eta)
+            lambda q, f, g, e: motor_motion(model.drives, Series(q), Series(f), g, e)
+        )(q, loads, gears, eta)
         return MotorCommand.from_samples(reference.times, outputs)
 
     def _smallest(self, model: ElasticRobot, q, eta) -> Scalar:
@@ -158,18 +157,20 @@ def _jacobian(correction: AbstractCorrection, model: ElasticRobot, q, eta):
 
 @kernel
 def _loaded_motion(how, model: ElasticRobot, sample, forcing, eta, factor):
-    """Corrected joint angles (order 3) and torques behind the gears (order 1)."""
+    """Corrected joint angles (order 3) and torques behind the gears (order 1).
+
+    Both orders are higher by one where the motors have a lag.
+    """
     correction, limiter, iterations = how
-    reference = from_derivatives(sample[:5]).truncated(3)
+    order = 1 + model.drives.extra_order
+    reference = from_derivatives(sample[: order + 3])
     deformation = deformation_series(model, eta, forcing)
     q = reference + correct(
         correction, model, reference, deformation, factor, limiter, iterations
     )
-    motion = (q.truncated(1), q.rate().truncated(1), q.rate().rate())
-    bending = (
-        deformation.truncated(1),
-        deformation.rate().truncated(1),
-        deformation.rate().rate(),
+    motion, bending = (
+        (x.truncated(order), x.rate().truncated(order), x.rate().rate())
+        for x in (q, deformation)
     )
     load, _ = inverse_dynamics(model, *motion, *bending)  # [Reiner2010] (3.91)
     return q, load
@@ -179,6 +180,8 @@ def _loaded_motion(how, model: ElasticRobot, sample, forcing, eta, factor):
 def structure_torque(model: ElasticRobot, sample: Derivatives) -> Series:
     r"""Torques in the structure of the rigid parallel model, with two derivatives.
 
+    Three where the motors have a lag.
+
     $-\hat\tau_e = M_{ea}\ddot q_r + h_e^*$ at $\eta = \dot\eta = 0$;
     $M_{ee}\ddot\eta$ is neglected.
 
@@ -186,9 +189,10 @@ def structure_torque(model: ElasticRobot, sample: Derivatives) -> Series:
         [Reiner2010] (3.76); its sign is that of (3.78), conventions 8 and 10 of the
         errata.
     """
-    q = from_derivatives(sample[:5])
+    order = 2 + model.drives.extra_order
+    q = from_derivatives(sample[: order + 3])
     qd, qdd = q.rate(), q.rate().rate()
-    _, force = inverse_dynamics(model, q.truncated(2), qd.truncated(2), qdd)
+    _, force = inverse_dynamics(model, q.truncated(order), qd.truncated(order), qdd)
     return -force
 
 
@@ -219,7 +223,7 @@ def advance_deformation(
 
 
 def deformation_series(model: ElasticRobot, eta: PerElastic, forcing: Series) -> Series:
-    """Deformations with three derivatives.
+    """Deformations with one derivative more than the forcing has, three or four.
 
     References:
         [Reiner2010] (3.78), (3.79).
@@ -231,7 +235,9 @@ def deformation_series(model: ElasticRobot, eta: PerElastic, forcing: Series) ->
 
 
 def deformations_along(
-    model: ElasticRobot, forcing: Float[Array, "times 3 elastic"], dt: Scalar | float
+    model: ElasticRobot,
+    forcing: Float[Array, "times terms elastic"],
+    dt: Scalar | float,
 ) -> Float[Array, "times elastic"]:
     """Deformations [rad] over a whole motion that starts at rest."""
 

@@ -20,8 +20,8 @@ class AbstractInverse(eqx.Module):
     """Feed-forward: from a reference of the joints to motor angles and torques."""
 
     @abc.abstractmethod
-    def order(self) -> int:
-        """Highest derivative of the reference that the inverse uses."""
+    def order(self, model: ElasticRobot) -> int:
+        """Highest derivative of the reference that the inverse of `model` uses."""
 
     @abc.abstractmethod
     def init(self, model: ElasticRobot, sample: Derivatives, dt: Scalar | float) -> Any:
@@ -61,7 +61,7 @@ class AbstractInverse(eqx.Module):
 def check_reference(inverse: AbstractInverse, model: ElasticRobot, reference) -> None:
     """Refuse a reference that does not fit the inverse or the model."""
     require_float64(type(inverse).__name__)
-    reference.require_order(inverse.order())
+    reference.require_order(inverse.order(model))
     axes = reference.derivatives.shape[2]
     if axes != model.axes:
         raise ValueError(
@@ -70,16 +70,16 @@ def check_reference(inverse: AbstractInverse, model: ElasticRobot, reference) ->
         )
 
 
-def samples_of(inverse: AbstractInverse, reference: Reference):
+def samples_of(inverse: AbstractInverse, model: ElasticRobot, reference: Reference):
     """Samples of the reference along the leading axis, (times, order + 1, axes)."""
-    return jnp.swapaxes(reference.derivatives[: inverse.order() + 1], 0, 1)
+    return jnp.swapaxes(reference.derivatives[: inverse.order(model) + 1], 0, 1)
 
 
 def feedforward_by_steps(
     inverse: AbstractInverse, model: ElasticRobot, reference: Reference
 ) -> MotorCommand:
     """`feedforward` by calling `step` sample by sample, as a controller would."""
-    samples = samples_of(inverse, reference)
+    samples = samples_of(inverse, model, reference)
     state = inverse.init(model, samples[0], reference.dt)
 
     def advance(state, sample):

@@ -8,21 +8,41 @@ from jaxtyping import Array, Float
 from .._custom_types import PerJoint, Scalar
 from .._kernel import kernel
 from .._taylor import Series
-from ..drivetrain import AbstractStiffness, DriveTrain
+from ..drivetrain import AbstractStiffness, DriveTrain, GearMemory
 from ..dynamics import MotorSample
+from ._memory_response import advance_memory, gear_field, memory_response
 from ._response import advance, response
+
+
+_BRACKETS = 60  # halvings; of the torsion at rest of a gear with a memory
+
+
+class GearState(eqx.Module):
+    """Torsion and memory of the gears.
+
+    Attributes:
+        torsion: output angle minus the angle behind the teeth [rad], shape (axes,).
+        memory: of the gears' branch, (states, axes); empty without one.
+    """
+
+    torsion: PerJoint
+    memory: GearMemory
+
+    def augmented(self) -> Float[Array, "unknowns axes"]:
+        """The torsion above the memory."""
+        return jnp.concatenate([self.torsion[None], self.memory])
 
 
 class DriveState(eqx.Module):
     """Memory of the inverse drive trains between two samples.
 
     Attributes:
-        torsion: output minus motor angle [rad], shape (axes,).
-        load: torque behind the gears and its rate at the last sample, shape (2, axes).
+        gear: of the gears.
+        load: torque behind the gears and its rates at the last sample, (terms, axes).
     """
 
-    torsion: PerJoint
-    load: Float[Array, "2 axes"]
+    gear: GearState
+    load: Float[Array, "terms axes"]
 
 
 def gear_spring(drives: DriveTrain) -> AbstractStiffness:
@@ -36,79 +56,159 @@ def gear_spring(drives: DriveTrain) -> AbstractStiffness:
     return drives.stiffness
 
 
-def resting_torsion(drives: DriveTrain, load: Series) -> PerJoint:
-    """Torsion [rad] under the constant torque `load` behind the gears."""
-    return gear_spring(drives).torsion(-load.coefficients[0])
+def resting_gear(drives: DriveTrain, load: Series) -> GearState:
+    """Gears at rest under the constant torque `load` behind them, loaded once."""
+    torque = -load.coefficients[0]
+    spring = gear_spring(drives)
+    torsion = spring.torsion(torque)
+    if drives.branch is not None:
+        torsion = _resting_torsion(drives, torque, torsion)
+    return GearState(torsion, drives.resting_memory(torsion))
 
 
-@kernel
-def advance_torsion(
+def _resting_torsion(drives: DriveTrain, torque, alone):
+    """Torsion at which spring and branch transmit `torque`, by halving intervals.
+
+    Found once, at the start of a motion; differentiated by one step of Newton.
+    """
+    law = drives.resting_torque
+    fixed = jax.lax.stop_gradient
+    held = jax.tree.map(fixed, drives)
+
+    def wide(k, ends):  # a branch may be softer or stiffer than nothing
+        low, high = ends
+        value = held.resting_torque
+        low = jnp.where(value(low) > fixed(torque), low - (high - low), low)
+        high = jnp.where(value(high) < fixed(torque), high + (high - low), high)
+        return low, high
+
+    def halve(k, ends):
+        low, high = ends
+        middle = 0.5 * (low + high)
+        below = held.resting_torque(middle) < fixed(torque)
+        return jnp.where(below, middle, low), jnp.where(below, high, middle)
+
+    size = fixed(jnp.abs(alone)) + 1e-9
+    ends = jax.lax.fori_loop(0, 30, wide, (-size, size))
+    low, high = jax.lax.fori_loop(0, _BRACKETS, halve, ends)
+    x = 0.5 * (low + high)
+    value, slope = jax.jvp(law, (x,), (jnp.ones_like(x),))
+    return x - (value - torque) / fixed(slope)
+
+
+def advance_gear(
     drives: DriveTrain,
-    torsion: PerJoint,
+    gear: GearState,
     before: Series,
     after: Series,
     dt: Scalar | float,
-) -> PerJoint:
-    """Torsion [rad] one sample later.
+) -> GearState:
+    """Gears one sample later.
+
+    Args:
+        drives: the drive trains.
+        gear: at the start of the sample.
+        before, after: torque behind the gears at its ends, order 1 or more.
+        dt: length of the sample [s].
 
     References:
         [Reiner2010] (3.93a) in the relative angle.
     """
+    if drives.branch is None:
+        torsion = _advance_torsion(drives, gear.torsion, before, after, dt)
+        return GearState(torsion, gear.memory)
+    field = gear_field(drives, drives.branch)
+    now = advance_memory(field, gear.augmented(), -before, -after, dt)
+    return GearState(now[0], now[1:])
+
+
+@kernel
+def _advance_torsion(drives: DriveTrain, torsion, before, after, dt):
     spring = gear_spring(drives).torque
     return advance(spring, drives.damping, torsion, -before, -after, dt)
 
 
-def torsions_along(
-    drives: DriveTrain, loads: Float[Array, "times 2 axes"], dt: Scalar | float
-) -> Float[Array, "times axes"]:
-    """Torsions [rad] over a whole motion that starts at rest.
+def gears_along(
+    drives: DriveTrain, loads: Float[Array, "times terms axes"], dt: Scalar | float
+) -> GearState:
+    """Gears over a whole motion that starts at rest, time along the leading axis.
 
     Args:
         drives: the drive trains.
-        loads: torque behind the gears and its rate [N m, N m/s], as coefficients.
+        loads: torque behind the gears and its rates [N m, N m/s], as coefficients.
         dt: time between samples [s].
     """
 
-    def step(torsion, pair):
-        before, after = Series(pair[0]), Series(pair[1])
-        torsion = advance_torsion(drives, torsion, before, after, dt)
-        return torsion, torsion
+    def step(gear, pair):
+        gear = advance_gear(drives, gear, Series(pair[0]), Series(pair[1]), dt)
+        return gear, gear
 
-    start = resting_torsion(drives, Series(loads[0]))
+    start = resting_gear(drives, Series(loads[0]))
     _, rest = jax.lax.scan(step, start, jnp.stack([loads[:-1], loads[1:]], axis=1))
-    return jnp.concatenate([start[None], rest])
+    return jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), start, rest)
 
 
 @kernel
 def motor_motion(
-    drives: DriveTrain, q: Series, load: Series, torsion: PerJoint, eta
+    drives: DriveTrain, q: Series, load: Series, gear: GearState, eta
 ) -> MotorSample:
     r"""Motor angles and torques from the motion and torque behind the gears.
 
-    $\theta = q - x$, and $\tau_m = \Theta\ddot\theta + \hat\tau_a +
-    \tau_r(\dot\theta)$: the gear's torque is the load's by the balance of the gear.
+    $\varphi_B = q - x$ stands behind the teeth and gives $\theta$, and
+    $\tau_m = \Theta\ddot\theta + \tau_A + \tau_r(\dot\theta)$: the gear's torque is the
+    load's by the balance of the gear, and $\tau_A$ what the teeth take for it. With a
+    lag of the motor the command is $\tau_m + T_m\dot\tau_m$.
 
     Args:
         drives: the drive trains.
-        q: joint angles, order 2 or more.
-        load: torque behind the gears, order 1.
-        torsion: x, output minus motor angle [rad].
+        q: joint angles, order 2 or more, 3 with a lag.
+        load: torque behind the gears, order 1, 2 with a lag.
+        gear: torsion and memory of the gears.
         eta: elastic coordinates to hand on.
 
     References:
-        [Reiner2010] (3.92) to (3.94).
+        [Reiner2010] (3.92) to (3.94); (2.2), (2.6), (2.11) for lag, ratio, efficiency.
     """
-    spring = gear_spring(drives).torque
-    x = response(spring, drives.damping, torsion, -load)
-    theta, thetad, thetadd = (q - x).derivatives()[:3]
-    tau_a = load.coefficients[0]
-    friction = drives.motor_friction.torque(thetad)
+    return motors_behind(drives, q, q - _torsion_series(drives, gear, load), load, eta)
+
+
+def motors_behind(
+    drives: DriveTrain, q: Series, angle: Series, load: Series, eta
+) -> MotorSample:
+    """Motor angles and torques from the motion and the torque behind the teeth.
+
+    Args:
+        drives, q, load, eta: as for `motor_motion`; without a lag the load may be of
+            order 0.
+        angle: behind the teeth, order 2 or more, 3 with a lag.
+    """
+    motion, behind = drives.before_teeth(angle).derivatives(), angle.derivatives()
+    tau_a, inertia = load.derivatives(), drives.reflected_inertia()
+
+    def torque(thetadd, tau_a, angle, thetad):
+        return inertia * thetadd + drives.motor_load(-tau_a, angle, thetad)
+
+    now = (motion[2], tau_a[0], behind[0], motion[1])
+    if drives.motor.lag is None:
+        tau_m = torque(*now)
+    else:
+        change = (motion[3], tau_a[1], behind[1], motion[2])
+        tau_m = drives.motor.command(*jax.jvp(torque, now, change))
     return MotorSample(
-        theta=theta,
-        thetad=thetad,
-        thetadd=thetadd,
-        tau_m=drives.reflected_inertia() * thetadd + tau_a + friction,
-        tau_a=tau_a,
+        theta=motion[0],
+        thetad=motion[1],
+        thetadd=motion[2],
+        tau_m=tau_m,
+        tau_a=tau_a[0],
         q=q.coefficients[0],
         eta=eta,
     )
+
+
+def _torsion_series(drives: DriveTrain, gear: GearState, load: Series) -> Series:
+    """The torsion with its derivatives, one order more than the load."""
+    if drives.branch is None:
+        spring = gear_spring(drives).torque
+        return response(spring, drives.damping, gear.torsion, -load)
+    field = gear_field(drives, drives.branch)
+    return memory_response(field, gear.augmented(), -load)[0]

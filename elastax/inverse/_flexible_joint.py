@@ -11,11 +11,11 @@ from ..signals import Reference
 from ._base import AbstractInverse, Derivatives, check_reference, samples_of
 from ._drive import (
     DriveState,
-    advance_torsion,
+    advance_gear,
     gear_spring,
+    gears_along,
     motor_motion,
-    resting_torsion,
-    torsions_along,
+    resting_gear,
 )
 
 
@@ -32,50 +32,49 @@ class FlexibleJointInverse(AbstractInverse):
         [Reiner2010] section 6.2 (RLFJ), (3.92) to (3.94).
     """
 
-    def order(self) -> int:
-        return 3
+    def order(self, model: ElasticRobot) -> int:
+        return 3 + model.drives.extra_order
 
     def init(
         self, model: ElasticRobot, sample: Derivatives, dt: Scalar | float
     ) -> _State:
         load = _load(model.flexible_joint(), sample)
-        torsion = resting_torsion(model.drives, load)
+        gear = resting_gear(model.drives, load)
         dt = jnp.asarray(dt, sample.dtype)
-        return _State(DriveState(torsion, load.coefficients), dt, jnp.zeros_like(dt))
+        return _State(DriveState(gear, load.coefficients), dt, jnp.zeros_like(dt))
 
     def step(
         self, model: ElasticRobot, state: _State, sample: Derivatives
     ) -> tuple[MotorSample, _State]:
         load = _load(model.flexible_joint(), sample)
         before = Series(state.drive.load)
-        torsion = advance_torsion(
-            model.drives, state.drive.torsion, before, load, state.elapsed
-        )
-        output = _output(model, sample, load, torsion)
-        drive = DriveState(torsion, load.coefficients)
+        gear = advance_gear(model.drives, state.drive.gear, before, load, state.elapsed)
+        output = _output(model, sample, load, gear)
+        drive = DriveState(gear, load.coefficients)
         return output, _State(drive, state.dt, state.dt)
 
     def feedforward(self, model: ElasticRobot, reference: Reference) -> MotorCommand:
         check_reference(self, model, reference)
         gear_spring(model.drives)
-        samples = samples_of(self, reference)
+        samples = samples_of(self, model, reference)
         rigid_links = model.flexible_joint()
         loads = jax.vmap(lambda s: _load(rigid_links, s).coefficients)(samples)
-        torsions = torsions_along(model.drives, loads, reference.dt)
-        outputs = jax.vmap(lambda s, f, x: _output(model, s, Series(f), x))(
-            samples, loads, torsions
+        gears = gears_along(model.drives, loads, reference.dt)
+        outputs = jax.vmap(lambda s, f, g: _output(model, s, Series(f), g))(
+            samples, loads, gears
         )
         return MotorCommand.from_samples(reference.times, outputs)
 
 
 def _load(model: ElasticRobot, sample: Derivatives) -> Series:
     """Torque behind the gears with its rate, [Reiner2010] (3.91)."""
-    q = from_derivatives(sample[:4])
+    order = 1 + model.drives.extra_order
+    q = from_derivatives(sample[: order + 3])
     qd, qdd = q.rate(), q.rate().rate()
-    tau_a, _ = inverse_dynamics(model, q.truncated(1), qd.truncated(1), qdd)
+    tau_a, _ = inverse_dynamics(model, q.truncated(order), qd.truncated(order), qdd)
     return tau_a
 
 
-def _output(model, sample, load, torsion) -> MotorSample:
+def _output(model, sample, load, gear) -> MotorSample:
     empty = jnp.zeros((0,), sample.dtype)
-    return motor_motion(model.drives, from_derivatives(sample), load, torsion, empty)
+    return motor_motion(model.drives, from_derivatives(sample), load, gear, empty)

@@ -70,11 +70,11 @@ def advance(
         Value at the end; local error of order 2 p + 2 in dt.
     """
     order = before.order + 1
-    explicit, implicit = _pade(order - 1, order)
-    known = _combine(explicit, response(spring, damping, x, before), dt)
+    explicit, implicit = pade(order - 1, order)
+    known = combine(explicit, response(spring, damping, x, before), dt)
 
     def residual(y):
-        return _combine(implicit, response(spring, damping, y, after), -dt) - known
+        return combine(implicit, response(spring, damping, y, after), -dt) - known
 
     def newton(y):
         value, slope = jax.jvp(residual, (y,), (jnp.ones_like(y),))
@@ -86,7 +86,7 @@ def advance(
     return y
 
 
-def _pade(numerator: int, denominator: int) -> tuple[list[float], list[float]]:
+def pade(numerator: int, denominator: int) -> tuple[list[float], list[float]]:
     """Coefficients of the Pade approximant of the exponential, of z and of -z."""
 
     def coefficients(degree):
@@ -101,7 +101,8 @@ def _pade(numerator: int, denominator: int) -> tuple[list[float], list[float]]:
     return coefficients(numerator), coefficients(denominator)
 
 
-def _combine(weights: list[float], series: Series, dt: Scalar | float) -> Channels:
+def combine(weights: list[float], series: Series, dt: Scalar | float):
+    """Sum of the derivatives of a series with the weights of one step `dt`."""
     derivatives = series.derivatives()
     return sum(
         (w * dt**i * derivatives[i] for i, w in enumerate(weights) if i > 0),

@@ -4,9 +4,11 @@ import jax
 import jax.numpy as jnp
 
 from .._custom_types import Scalar
+from .._taylor import from_derivatives
 from ..dynamics import ElasticRobot, MotorCommand, MotorSample, inverse_dynamics
 from ..signals import Reference
 from ._base import AbstractInverse, Derivatives, check_reference, samples_of
+from ._drive import motors_behind
 
 
 class RigidInverse(AbstractInverse):
@@ -18,8 +20,8 @@ class RigidInverse(AbstractInverse):
         [Reiner2010] section 6.2, the feed-forward of a rigid robot.
     """
 
-    def order(self) -> int:
-        return 2
+    def order(self, model: ElasticRobot) -> int:
+        return 2 + model.drives.extra_order
 
     def init(
         self, model: ElasticRobot, sample: Derivatives, dt: Scalar | float
@@ -29,15 +31,15 @@ class RigidInverse(AbstractInverse):
     def step(
         self, model: ElasticRobot, state: None, sample: Derivatives
     ) -> tuple[MotorSample, None]:
-        q, qd, qdd = sample[:3]
-        drives = model.drives
-        tau_a, _ = inverse_dynamics(model.rigid(), q, qd, qdd)
-        friction = drives.motor_friction.torque(qd)
-        tau_m = tau_a + drives.reflected_inertia() * qdd + friction
-        return MotorSample(q, qd, qdd, tau_m, tau_a, q, jnp.zeros((0,), q.dtype)), None
+        order = model.drives.extra_order
+        q = from_derivatives(sample[: order + 3])
+        motion = q.truncated(order), q.rate().truncated(order), q.rate().rate()
+        load, _ = inverse_dynamics(model.rigid(), *motion)
+        empty = jnp.zeros((0,), sample.dtype)
+        return motors_behind(model.drives, q, q, load, empty), None
 
     def feedforward(self, model: ElasticRobot, reference: Reference) -> MotorCommand:
         check_reference(self, model, reference)
-        samples = samples_of(self, reference)
+        samples = samples_of(self, model, reference)
         outputs, _ = jax.vmap(lambda sample: self.step(model, None, sample))(samples)
         return MotorCommand.from_samples(reference.times, outputs)

@@ -44,7 +44,7 @@ def step_program(inverse: AbstractInverse, model: ElasticRobot) -> StepProgram:
     require_float64(type(inverse).__name__)
     arrays, rest = _parts(inverse, model)
     parameters = FlatLayout.of(arrays)
-    shape = (inverse.order() + 1, model.axes)
+    shape = (inverse.order(model) + 1, model.axes)
     vector = lambda layout: jax.ShapeDtypeStruct((layout.size,), jnp.float64)
     sample = jax.ShapeDtypeStruct(shape, jnp.float64)
 

@@ -12,6 +12,7 @@ from ..drivetrain import (
     DriveTrain,
     GasCounterbalance,
     LinearStiffness,
+    Motor,
     SpringCounterbalance,
 )
 from ..dynamics import ElasticJoint, ElasticRobot, EndSlope
@@ -125,7 +126,7 @@ def drives_of(gears) -> DriveTrain:
 
     return DriveTrain(
         ratio=column("ratio"),
-        motor_inertia=column("motor_inertia"),
+        motor=Motor(column("motor_inertia")),
         stiffness=CubicStiffness(stiffness, hardening)
         if hardening.any()
         else LinearStiffness(stiffness),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..drivetrain import CoulombViscousFriction, DriveTrain, LinearStiffness
+from ..drivetrain import CoulombViscousFriction, DriveTrain, LinearStiffness, Motor
 from ..dynamics import Body, ElasticRobot, JointLimits, assemble
 from ..structure import BeamSection
 from . import _quantec as quantec
@@ -124,7 +124,7 @@ def _drives() -> DriveTrain:
     )
     return DriveTrain(
         ratio=quantec.RATIO,
-        motor_inertia=INERTIA_SCALE * quantec.MOTOR_INERTIA,
+        motor=Motor(INERTIA_SCALE * quantec.MOTOR_INERTIA),
         stiffness=LinearStiffness(TORQUE_SCALE * quantec.GEAR_STIFFNESS),
         damping=TORQUE_SCALE * quantec.GEAR_DAMPING,
         motor_friction=friction,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..drivetrain import CoulombViscousFriction, DriveTrain, LinearStiffness
+from ..drivetrain import CoulombViscousFriction, DriveTrain, LinearStiffness, Motor
 from ..dynamics import (
     Axis,
     Body,
@@ -133,7 +133,7 @@ def _drives() -> DriveTrain:
     steepness = np.full(6, STEEPNESS)
     return DriveTrain(
         ratio=RATIO,
-        motor_inertia=MOTOR_INERTIA,
+        motor=Motor(MOTOR_INERTIA),
         stiffness=LinearStiffness(
             np.concatenate([RATIO[:3] ** 2 * SPRING, omega**2 * inertia])
         ),

@@ -11,6 +11,7 @@ from ..drivetrain import (
     DriveTrain,
     GasCounterbalance,
     LinearStiffness,
+    Motor,
 )
 from ..structure import BeamSection, Material
 
@@ -88,7 +89,7 @@ def drives(friction: AbstractFriction) -> DriveTrain:
     """Drive trains with the given friction at the motors."""
     return DriveTrain(
         ratio=RATIO,
-        motor_inertia=MOTOR_INERTIA,
+        motor=Motor(MOTOR_INERTIA),
         stiffness=LinearStiffness(GEAR_STIFFNESS),
         damping=GEAR_DAMPING,
         motor_friction=friction,

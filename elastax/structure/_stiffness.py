@@ -41,6 +41,10 @@ class AbstractStiffness(eqx.Module):
         """Tangent stiffness [N m/rad], the derivative of `torque`."""
 
     @abc.abstractmethod
+    def secant(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
+        """Secant stiffness [N m/rad], `torque` over torsion; at zero its limit."""
+
+    @abc.abstractmethod
     def potential(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
         """Stored energy [J], zero at zero torsion."""
 
@@ -89,6 +93,9 @@ class LinearStiffness(AbstractStiffness):
     def stiffness(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
         return self.linear * jnp.ones_like(torsion)
 
+    def secant(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
+        return self.linear * jnp.ones_like(torsion)
+
     def potential(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
         return 0.5 * self.linear * torsion**2
 
@@ -128,13 +135,16 @@ class CubicStiffness(AbstractStiffness):
         )
 
     def torque(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
-        return self.linear * (1.0 + self.hardening * torsion**2) * torsion
+        return self.secant(torsion) * torsion
 
     def torsion(self, torque: Float[Array, "..."]) -> Float[Array, "..."]:
         return _invert(_solve_cubic, self, torque)
 
     def stiffness(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
         return self.linear * (1.0 + 3.0 * self.hardening * torsion**2)
+
+    def secant(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
+        return self.linear * (1.0 + self.hardening * torsion**2)
 
     def potential(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
         square = torsion**2
@@ -200,8 +210,7 @@ class LimitedStiffness(AbstractStiffness):
         check_values("`steepness` must be positive", self.steepness, self.steepness > 0)
 
     def torque(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
-        hardened = self.linear * (1.0 + self.hardening * torsion**2)
-        return torsion * _limited_secant(self, hardened)
+        return torsion * self.secant(torsion)
 
     def torsion(self, torque: Float[Array, "..."]) -> Float[Array, "..."]:
         return _invert(_solve_limited, self, torque)
@@ -211,6 +220,10 @@ class LimitedStiffness(AbstractStiffness):
         hardened = self.linear + rise
         slope = _limit_slope(hardened, self.limit, self.steepness)
         return _limited_secant(self, hardened) + 2.0 * rise * slope
+
+    def secant(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
+        hardened = self.linear * (1.0 + self.hardening * torsion**2)
+        return _limited_secant(self, hardened)
 
     def potential(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
         r"""Stored energy [J].

@@ -18,7 +18,7 @@ def test_one_elastic_axis_of_the_vectors():
     one = np.ones(1)
     drives = systems.DriveTrain(
         ratio=given["i"] * one,
-        motor_inertia=given["J_m"] * one,
+        motor=systems.Motor(given["J_m"] * one),
         stiffness=systems.CubicStiffness(given["c0"] * one, given["gamma"] * one),
         damping=given["d"] * one,
         motor_friction=systems.friction(

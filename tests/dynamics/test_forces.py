@@ -28,7 +28,7 @@ def test_rod_of_the_counterbalance_resists():
         return inverse_dynamics(robot, q, qd, zero)[0]
 
     def power(robot):
-        return dissipated_power(robot, q, qd, zero, qd)
+        return dissipated_power(robot, q, q, qd, zero, qd)
 
     more = systems.run(torque, damped) - systems.run(torque, free)
     # the rod's speed is that of its length

@@ -77,7 +77,7 @@ def test_energy_balance():
         def energies(q, eta, theta, qd, etad, thetad, tau_m):
             total = kinetic_energy(robot, q, eta, qd, etad, thetad)
             total = total + potential_energy(robot, q, eta, theta)
-            lost = dissipated_power(robot, q, qd, etad, thetad)
+            lost = dissipated_power(robot, q, theta, qd, etad, thetad)
             return total, lost, jnp.sum(tau_m * thetad)
 
         fields = ("q", "eta", "theta", "qd", "etad", "thetad", "tau_m")

@@ -2,7 +2,12 @@
 
 import jax.numpy as jnp
 import numpy as np
-from elastax.drivetrain import CoulombViscousFriction, DriveTrain, LinearStiffness
+from elastax.drivetrain import (
+    CoulombViscousFriction,
+    DriveTrain,
+    LinearStiffness,
+    Motor,
+)
 from elastax.dynamics import Axis, Body, JointLimits, Offset, assemble
 from elastax.identification import Recording
 
@@ -32,7 +37,7 @@ def arm():
         ],
         DriveTrain(
             ratio=RATIO,
-            motor_inertia=np.array([1e-3, 5e-4]),
+            motor=Motor(np.array([1e-3, 5e-4])),
             stiffness=LinearStiffness(np.array([2e5, 1e5])),
             damping=np.array([200.0, 100.0]),
             motor_friction=none,

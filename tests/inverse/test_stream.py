@@ -36,7 +36,7 @@ INVERSES = [RigidInverse(), FlexibleJointInverse(), ELASTIC]
 class Echo(AbstractInverse):
     """Does nothing: what is left is the cost of a call."""
 
-    def order(self):
+    def order(self, model):
         return 1
 
     def init(self, model, sample, dt):
@@ -194,7 +194,7 @@ def test_export_runs_without_the_package(inverse, model, reference, samples, tmp
     archive = export_step(inverse, model, dt)
     file, motion, result = (tmp_path / n for n in ("s.zip", "motion.npy", "out.npz"))
     file.write_bytes(archive)
-    np.save(motion, samples[:, : inverse.order() + 1])
+    np.save(motion, samples[:, : inverse.order(model) + 1])
     script = tmp_path / "reader.py"
     script.write_text(READER)
     cache = jax.config.jax_compilation_cache_dir

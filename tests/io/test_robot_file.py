@@ -14,6 +14,7 @@ from elastax.drivetrain import (
     DriveTrain,
     GasCounterbalance,
     LinearStiffness,
+    Motor,
     SpringCounterbalance,
 )
 from elastax.dynamics import (
@@ -90,7 +91,7 @@ def by_hand():
     ]
     drives = DriveTrain(
         ratio=np.array([100.0, 120.0, 80.0]),
-        motor_inertia=np.array([5e-4, 5e-4, 3e-4]),
+        motor=Motor(np.array([5e-4, 5e-4, 3e-4])),
         stiffness=LinearStiffness(np.array([2.0e5, 2.0e5, 8.0e4])),
         damping=np.array([150.0, 150.0, 60.0]),
         motor_friction=CoulombViscousFriction(

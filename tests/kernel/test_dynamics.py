@@ -95,9 +95,9 @@ def test_step_of_asim(make):
     robot = make()
     axes = (0, 1) if robot.axes < 3 else (0, 1, 2)
     inverse = ASIM(correction=PositionCorrection(axes=axes))
-    scale = 0.3 * 10.0 ** jnp.arange(inverse.order() + 1.0)[None, :, None]
+    scale = 0.3 * 10.0 ** jnp.arange(inverse.order(robot) + 1.0)[None, :, None]
     samples = scale * jax.random.normal(
-        jax.random.key(0), (3, inverse.order() + 1, robot.axes)
+        jax.random.key(0), (3, inverse.order(robot) + 1, robot.axes)
     )
 
     def function(robot, sample, following):
