@@ -22,6 +22,19 @@ from ._friction import (
     CoulombViscousFriction as CoulombViscousFriction,
     TwoScaleFriction as TwoScaleFriction,
 )
+from ._hysteresis import (
+    AbstractSmoothPlay as AbstractSmoothPlay,
+    DelayedPlay as DelayedPlay,
+    PadeDelay as PadeDelay,
+    PrandtlIshlinskii as PrandtlIshlinskii,
+    RateIndependentPlay as RateIndependentPlay,
+    play as play,
+)
+from ._hysteretic_branch import (
+    ExactStopBranch as ExactStopBranch,
+    HysteresisBranch as HysteresisBranch,
+    StopBranch as StopBranch,
+)
 from ._mesh import AbstractMesh as AbstractMesh
 from ._motor import Motor as Motor
 from ._transmission_error import TransmissionError as TransmissionError

@@ -3,7 +3,7 @@ r"""Elements with memory that stand parallel to the spring and the damper of a g
 A branch adds a torque $b(x, z)$ to that of the gear's spring. It depends on the torsion
 $x = q - \theta$ and on internal states $z$ of its own, but not on the rate of the
 torsion: with the linear damper $d > 0$ of the gear the torque
-$\tau = k(x) + d\,\dot x + b(x, z)$ is solved for $\dot x$, and $\dot z$ follows from it.
+$\tau = k(x) + d\,\dot x + b(x, z)$ is solved for $\dot x$, and $\dot z$ follows.
 So a gear with branches has an exact inverse, the states of which are $x$ and $z$.
 """
 
@@ -58,7 +58,7 @@ class AbstractGearBranch(eqx.Module):
 
     @abc.abstractmethod
     def scaled(self, factor: Float[Array, "..."] | float) -> "AbstractGearBranch":
-        """The branch beside the spring `scaled` alike: its torque times `factor` > 0."""
+        """The branch beside a spring `scaled` alike: its torque times `factor`."""
 
 
 class AbstractSwitchingBranch(eqx.Module):
@@ -100,7 +100,7 @@ class AbstractSwitchingBranch(eqx.Module):
 
     @abc.abstractmethod
     def scaled(self, factor: Float[Array, "..."] | float) -> "AbstractSwitchingBranch":
-        """The branch beside the spring `scaled` alike: its torque times `factor` > 0."""
+        """The branch beside a spring `scaled` alike: its torque times `factor`."""
 
 
 class RelaxationBranch(AbstractGearBranch):
@@ -108,9 +108,9 @@ class RelaxationBranch(AbstractGearBranch):
 
     $$b = c_2\,(x - z),\qquad c_2\,(x - z) = c_3(z) + d_z\,\dot z$$
 
-    Parallel to the spring $c_1$ of the gear stands the soft spring $c_2$, in series with
-    the parallel pair of the spring $c_3$ and a damper. Slow motion meets $c_1$ and the
-    series of $c_2$ and $c_3$, fast motion $c_1 + c_2$; in between energy is lost. The
+    Parallel to the spring $c_1$ of the gear stands the soft spring $c_2$, in series
+    with the parallel pair of the spring $c_3$ and a damper. Slow motion meets $c_1$ and
+    the series of $c_2$ and $c_3$, fast motion $c_1 + c_2$; in between energy is lost. The
     stored energy is that of $c_2$ and $c_3$, the loss $d_z \dot z^2 \ge 0$.
 
     The text describes the elements of its figure 2.5b, but not how they are connected;
