@@ -17,7 +17,7 @@ from jaxtyping import Array, Float
 from .._checks import check_fields, check_values, is_concrete
 from .._custom_types import PerJoint, as_real
 from ..structure import AbstractStiffness
-from ._branch import AbstractGearBranch, AbstractSwitchingBranch
+from ._branch import AbstractGearBranch, AbstractSwitchingBranch, MemoryPath
 from ._hysteresis import AbstractSmoothPlay, play
 
 
@@ -68,6 +68,9 @@ class StopBranch(AbstractGearBranch):
         self, torsion: PerJoint, rate: PerJoint, memory: Float[Array, "states joints"]
     ) -> Float[Array, "states joints"]:
         return self.play.rates(torsion, rate, memory)
+
+    def path(self) -> MemoryPath | None:
+        return self.play.path()
 
     def scaled(self, factor: Float[Array, "..."] | float) -> "StopBranch":
         return dataclasses.replace(self, stiffness=factor * self.stiffness)
@@ -126,6 +129,9 @@ class HysteresisBranch(AbstractGearBranch):
         self, torsion: PerJoint, rate: PerJoint, memory: Float[Array, "states joints"]
     ) -> Float[Array, "states joints"]:
         return self.play.rates(torsion, rate, memory)
+
+    def path(self) -> MemoryPath | None:
+        return self.play.path()
 
     def scaled(self, factor: Float[Array, "..."] | float) -> "HysteresisBranch":
         return self  # the factor is in the spring

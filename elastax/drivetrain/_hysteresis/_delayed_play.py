@@ -85,6 +85,9 @@ class DelayedPlay(AbstractSmoothPlay):
         rates = self.delay.rates(self._by_order(states), self.outputs(x, states))
         return jnp.swapaxes(rates, 0, 1).reshape(self.states, -1)
 
+    def path(self) -> None:
+        return None
+
     def _by_order(self, states):
         """States as (order, plays, joints)."""
         split = states.reshape(self.number, self.delay.order, -1)

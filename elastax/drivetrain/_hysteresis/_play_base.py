@@ -1,6 +1,7 @@
 """What smooth plays share: outputs and rates from states."""
 
 import abc
+from collections.abc import Callable
 
 import equinox as eqx
 from jaxtyping import Array, Float
@@ -41,3 +42,11 @@ class AbstractSmoothPlay(eqx.Module):
         states: Float[Array, "states joints"],
     ) -> Float[Array, "states joints"]:
         """Time derivatives of the states, for an input `x` of the rate `xd`."""
+
+    @abc.abstractmethod
+    def path(self) -> Callable | None:
+        """How the states follow the input alone, or `None` where they take time.
+
+        The function takes the input and the states at the start of a monotone piece of
+        the input and the input at its end, and returns the states there.
+        """

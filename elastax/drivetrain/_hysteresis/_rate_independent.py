@@ -1,5 +1,7 @@
 """A smooth play that keeps its memory and does not depend on the speed."""
 
+from collections.abc import Callable
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -93,6 +95,31 @@ class RateIndependentPlay(AbstractSmoothPlay):
         ahead = x[None] - states
         up, down = _growth(psi * (ahead - r)), _growth(psi * (-ahead - r))
         return xd[None] * (rising * up + falling * down)
+
+    def path(self) -> Callable:
+        return self._after
+
+    def _after(self, start, states, end):
+        """States after a monotone motion of the input, in closed form."""
+        psi, r = self.sharpness[None], self.thresholds
+        way, ahead = (end - start)[None], start[None] - states
+        up = _approach(psi * (ahead - r), psi * way)
+        down = _approach(psi * (-ahead - r), -psi * way)
+        return states + jnp.where(way >= 0, up, -down) / psi
+
+
+def _approach(gap, way):
+    """Solution of z' = exp(gap + way - z), z = 0 at way = 0, for a `gap` up to zero.
+
+    $\\ln(1 + e^{gap}(e^{way} - 1))$, without overflow and without cancellation.
+    """
+    gap = jnp.minimum(gap, 0.0)
+    way = jnp.maximum(way, 0.0)
+    end = gap + way
+    inside, beyond = jnp.minimum(end, 0.0), jnp.maximum(end, 0.0)
+    near = jnp.log1p(jnp.exp(inside) - jnp.exp(gap))
+    far = beyond + jnp.log1p(-jnp.exp(-beyond) * jnp.expm1(gap))
+    return jnp.where(end < 0.0, near, far)
 
 
 def _growth(z):
