@@ -135,6 +135,8 @@ def _advance_on_path(drives: DriveTrain, gear: GearState, before, after, dt):
 
     if drives.branch is None:
         spring = gear_spring(drives).torque
+    else:  # plays turn within a sample: a higher order would see their corners
+        before, after = before.truncated(1), after.truncated(1)
     torsion = advance(spring, drives.damping, gear.torsion, -before, -after, dt)
     return GearState(torsion, memory(torsion))
 
