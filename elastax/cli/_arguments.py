@@ -124,7 +124,7 @@ def _add_feedforward(commands) -> None:
         "--parts",
         metavar="FILE.toml",
         help="other parts in the drive trains of plant and inverses: friction, "
-        "stiffness, hysteresis, lag; see examples/drive_parts.toml",
+        "stiffness, hysteresis, lag; see examples/drive_parts",
     )
     add(
         "--plant-parts",

@@ -37,4 +37,12 @@ from ._hysteretic_branch import (
 )
 from ._mesh import AbstractMesh as AbstractMesh
 from ._motor import Motor as Motor
+from ._switching_friction import (
+    AbstractSwitchingFriction as AbstractSwitchingFriction,
+    StickSlipFriction as StickSlipFriction,
+)
+from ._switching_mesh import (
+    AbstractSwitchingMesh as AbstractSwitchingMesh,
+    ExactEfficiency as ExactEfficiency,
+)
 from ._transmission_error import TransmissionError as TransmissionError

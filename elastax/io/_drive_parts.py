@@ -47,7 +47,7 @@ def load_drive_parts(path: str | pathlib.Path, drives: DriveTrain) -> DriveTrain
     the attributes of that law. A number holds for all axes, a list has one entry per
     axis; where a law has several plays, a list has one entry per play, a number or a
     list per axis. All values are those of the output side, but for the motor. A table
-    `motor` without `kind` changes what it names. `examples/drive_parts.toml` shows it.
+    `motor` without `kind` changes what it names. `examples/drive_parts` shows each.
 
     Args:
         path: of the file.
