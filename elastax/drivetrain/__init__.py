@@ -11,6 +11,7 @@ from ._branch import (
     AbstractSwitchingBranch as AbstractSwitchingBranch,
     RelaxationBranch as RelaxationBranch,
 )
+from ._clutch import FrictionContact as FrictionContact
 from ._counterbalance import (
     AbstractCounterbalance as AbstractCounterbalance,
     GasCounterbalance as GasCounterbalance,
