@@ -2,6 +2,7 @@
 
 from ..structure import (
     AbstractStiffness as AbstractStiffness,
+    AxisStiffness as AxisStiffness,
     CubicStiffness as CubicStiffness,
     LimitedStiffness as LimitedStiffness,
     LinearStiffness as LinearStiffness,
@@ -19,7 +20,13 @@ from ._counterbalance import (
 from ._drivetrain import DriveTrain as DriveTrain, GearMemory as GearMemory
 from ._friction import (
     AbstractFriction as AbstractFriction,
+    AsymmetricFriction as AsymmetricFriction,
+    AxisFriction as AxisFriction,
+    BreakawayFriction as BreakawayFriction,
     CoulombViscousFriction as CoulombViscousFriction,
+    PiecewiseFriction as PiecewiseFriction,
+    StribeckFriction as StribeckFriction,
+    TemperatureFriction as TemperatureFriction,
     TwoScaleFriction as TwoScaleFriction,
 )
 from ._mesh import AbstractMesh as AbstractMesh

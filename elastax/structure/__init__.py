@@ -1,5 +1,6 @@
 """Elastic structure: spring laws, bearings and beams."""
 
+from ._axes import AxisStiffness as AxisStiffness
 from ._beam import (
     HINGE_POSITION as HINGE_POSITION,
     TIP_FORCE as TIP_FORCE,
