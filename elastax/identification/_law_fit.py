@@ -14,7 +14,7 @@ from jaxtyping import Array, Bool, Float, Int
 from .._custom_types import Scalar, as_real, require_float64
 
 
-# Unknowns stay within this factor (as power of e) of their start: no overflow on the way.
+# Unknowns stay within this power of e about their start: nothing overflows on the way.
 _REACH = 40.0
 
 
@@ -57,11 +57,12 @@ def fit_law(
     law: Any,
     function: Callable[[Any, Any], Float[Array, "..."]],
     inputs: Any,
-    outputs: Float[Array, "samples *shape"],
+    outputs: Float[Array, " samples *shape"],
     *,
     held: Callable[[Any], Any] | None = None,
     signed: Callable[[Any], Any] | None = None,
     deviation: Float[Array, ""] | float | None = None,
+    starts: int = 1,
     solver: optx.AbstractLeastSquaresSolver | None = None,
     max_steps: int = 1000,
     throw: bool = True,
@@ -75,6 +76,9 @@ def fit_law(
     reported as unidentifiable. Such parameters stay near their start. A law with
     conditions between its parameters is not asked about them on the way.
 
+    Where sections of a law meet at a fitted place, as in `PiecewiseFriction`, the sum
+    of squares has several minima: take some `starts` and the best of them.
+
     Args:
         law: friction, stiffness or any other module; its values are the start.
         function: output of the law at one sample of the inputs.
@@ -85,8 +89,11 @@ def fit_law(
         signed: selects those that may change their sign, such as an offset.
         deviation: standard deviation $\sigma$ of the outputs; estimated from the
             residuals unless given.
+        starts: number of starts. The first is the law as given; the others have every
+            free entry multiplied by a factor between one half and two, always the
+            same ones.
         solver: Levenberg-Marquardt unless given.
-        max_steps: largest number of steps.
+        max_steps: largest number of steps from each start.
         throw: whether to raise if the solver fails; `result` says so otherwise.
 
     Raises:
@@ -123,22 +130,33 @@ def fit_law(
         return (predicted - outputs).ravel() / scale
 
     logarithmic = (start > 0) & ~_marks(free, signed)
-    size = jnp.where(start == 0, jnp.ones_like(start), jnp.abs(start))
+    size = jnp.where(start == 0, 1.0, jnp.abs(start))
 
     def values_of(unknowns):
         power = _REACH * jnp.tanh(unknowns / _REACH)
         return jnp.where(logarithmic, size * jnp.exp(power), start + size * unknowns)
 
-    solution = optx.least_squares(
-        lambda unknowns, _: residuals(values_of(unknowns)),
-        optx.LevenbergMarquardt(rtol=1e-10, atol=1e-10) if solver is None else solver,
-        jnp.zeros_like(start),
-        max_steps=max_steps,
-        throw=throw,
-    )
-    values = values_of(solution.value)
-    remaining = residuals(values)
-    square = jnp.sum(remaining**2)
+    if solver is None:
+        solver = optx.LevenbergMarquardt(rtol=1e-10, atol=1e-10)
+
+    def minimise(unknowns):
+        solution = optx.least_squares(
+            lambda unknowns, _: residuals(values_of(unknowns)),
+            solver,
+            unknowns,
+            max_steps=max_steps,
+            throw=False,
+        )
+        values = values_of(solution.value)
+        steps = jnp.asarray(solution.stats["num_steps"])
+        return values, solution.result, steps, jnp.sum(residuals(values) ** 2)
+
+    found = jax.vmap(minimise)(_first_unknowns(logarithmic, starts))
+    square = jnp.where(jnp.isnan(found[-1]), jnp.inf, found[-1])
+    best = jnp.argmin(square)
+    values, result, steps, square = jax.tree.map(lambda leaf: leaf[best], found)
+    if throw:
+        values = result.error_if(values, result != optx.RESULTS.successful)
     variance = 1.0
     if deviation is None:
         variance = square / (outputs.size - count)
@@ -152,8 +170,8 @@ def fit_law(
         errors,
         scale * jnp.sqrt(square / outputs.size),
         1.0 - square * scale**2 / spread,
-        solution.result,
-        jnp.asarray(solution.stats["num_steps"]),
+        result,
+        steps,
     )
 
 
@@ -180,6 +198,14 @@ def _marks(free, select):
     return np.concatenate(flat) > 0
 
 
+def _first_unknowns(logarithmic, starts):
+    """Unknowns of every start; zero is the law as given."""
+    powers = np.random.default_rng(0).uniform(-1.0, 1.0, (starts, logarithmic.size))
+    powers[0] = 0.0
+    power = np.log(2.0) * powers
+    return jnp.where(logarithmic, power, np.expm1(power))
+
+
 def _names(free):
     names = []
     for path, leaf in jax.tree_util.tree_flatten_with_path(free)[0]:
@@ -201,7 +227,7 @@ def _root_covariance(jacobian):
     _, size, right = jnp.linalg.svd(jacobian / length[None], full_matrices=False)
     precision = jnp.finfo(size.dtype).eps
     lost = size <= max(jacobian.shape) * precision * size[0]
-    # A vector of the null space has entries of rounding where a parameter plays no part.
+    # Where a parameter plays no part, a vector of the null space holds rounding.
     involved = jnp.any(lost[:, None] & (jnp.abs(right) > jnp.sqrt(precision)), axis=0)
     inverse = jnp.where(lost, 0.0, 1.0 / jnp.where(lost, 1.0, size))
     root = jnp.linalg.norm(right * inverse[:, None], axis=0) / length

@@ -82,7 +82,7 @@ class PiecewiseFriction(AbstractFriction):
     def is_monotone(self) -> Bool[Array, "..."]:
         return (_least_slope(self) >= 0) & (self.break_slope > 0)
 
-    def coefficients(self) -> Float[Array, "powers *joints"]:
+    def coefficients(self) -> Float[Array, " powers *joints"]:
         """Coefficients $p_1$ to $p_4$ of the cubic, of descending powers."""
         # Derivatives of the cubic at its inner end, moved to speed zero.
         start = self.step_speed
