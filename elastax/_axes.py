@@ -30,9 +30,10 @@ def check_axes(laws: Sequence[Any], axes: Axes) -> None:
         )
 
 
-def on_axes(value: Array | float, group: tuple[int, ...]) -> Array | float:
+def on_axes(value: Array | float, group: tuple[int, ...]) -> Array:
     """Entries of the last axis that belong to the `group`; a scalar is for all."""
-    return value if jnp.ndim(value) == 0 else value[..., np.array(group)]
+    value = jnp.asarray(value)
+    return value if value.ndim == 0 else value[..., np.array(group)]
 
 
 def along_axes(axes: Axes, functions: Sequence[Callable], argument: Array) -> Array:
