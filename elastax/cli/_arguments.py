@@ -14,6 +14,8 @@ class FeedforwardConfig:
 
     Attributes:
         robot: built-in name, TOML file or URDF.
+        parts: TOML file of drive-train parts for plant and inverses, or `None`.
+        plant_parts: the same for the plant alone.
         pose: named pose or one angle per axis [deg].
         move: angle per axis to move by [deg]; shorter lists leave the rest at rest.
         path: "rectangle" or a CSV file of way-points x, y, z [m], or `None`.
@@ -34,6 +36,8 @@ class FeedforwardConfig:
     """
 
     robot: str = "kr210"
+    parts: str | None = None
+    plant_parts: str | None = None
     pose: tuple[str, ...] = ("stretched",)
     move: tuple[float, ...] = (5.0, 5.0, 5.0)
     path: str | None = None
@@ -116,6 +120,17 @@ def _add_feedforward(commands) -> None:
     )
     add = parser.add_argument
     add("--robot", default=default.robot, metavar="NAME|FILE", help="the robot")
+    add(
+        "--parts",
+        metavar="FILE.toml",
+        help="other parts in the drive trains of plant and inverses: friction, "
+        "stiffness, hysteresis, lag; see examples/drive_parts",
+    )
+    add(
+        "--plant-parts",
+        metavar="FILE.toml",
+        help="the same in the plant alone, exact (switching) parts included",
+    )
     add(
         "--pose",
         nargs="+",

@@ -21,7 +21,7 @@ from ..inverse import (
     compile_step,
     latency,
 )
-from ..io import versions, write_results
+from ..io import load_drive_parts, versions, write_results
 from ..robots import named_robot
 from ..signals import Reference
 from ._arguments import FeedforwardConfig
@@ -72,6 +72,8 @@ def feedforward(config: FeedforwardConfig, progress: Progress) -> int:
         ValueError: bad input, before any long computation.
     """
     robot = with_payload(named_robot(config.robot), config.payload)
+    robot = with_parts(robot, config.parts)
+    plant = with_parts(robot, config.plant_parts)
     _check(config)
     result = {"schema": SCHEMA, "robot": robot.name, "versions": versions()}
     result["configuration"] = dataclasses.asdict(config)
@@ -81,6 +83,7 @@ def feedforward(config: FeedforwardConfig, progress: Progress) -> int:
     if config.recording is not None:
         report, motion = run_recording(robot, config, progress)
         robot, result["recording"] = report.robot, report.summary
+        plant = robot
         arrays.update(report.arrays)
     else:
         report, motion = None, build_motion(robot, config)
@@ -90,8 +93,9 @@ def feedforward(config: FeedforwardConfig, progress: Progress) -> int:
         f"{robot.name}: {robot.axes} axes, {robot.elastic} elastic coordinates; "
         f"{motion.reference.times.shape[0]} samples"
     )
-    programs = compile_programs(robot, motion.reference, config.inverses, progress)
-    runs, cost = run_all(robot, motion.reference, programs, progress)
+    both = (robot, plant)
+    programs = compile_programs(*both, motion.reference, config.inverses, progress)
+    runs, cost = run_all(*both, motion.reference, programs, progress)
     if config.stream:
         for name in config.inverses:
             cost[name].update(stream_cost(name, robot, motion.reference, progress))
@@ -100,7 +104,7 @@ def feedforward(config: FeedforwardConfig, progress: Progress) -> int:
     perturbed = grid = None
     if config.perturb is not None:
         perturbed = run_perturbed(
-            robot, motion.reference, programs, runs, config.perturb, progress
+            *both, motion.reference, programs, runs, config.perturb, progress
         )
         result["perturbation"] = perturbed
         print(perturbation_table(perturbed))
@@ -131,8 +135,19 @@ def _check(config: FeedforwardConfig) -> None:
         raise ValueError(f"--out must be a folder, but {config.out} is a file")
     if not config.cutoff > 0:
         raise ValueError(f"--cutoff must be positive [Hz], but is {config.cutoff:g}")
+    elsewhere = config.grid is not None or config.recording is not None
+    if config.plant_parts is not None and elsewhere:
+        raise ValueError("--plant-parts goes with neither --grid nor --recording")
     if config.identify_on is not None and config.recording is None:
         raise ValueError("--identify-on needs a --recording to apply the fit to")
+
+
+def with_parts(robot: ElasticRobot, path: str | None) -> ElasticRobot:
+    """Robot with the drive-train parts of a file."""
+    if path is None:
+        return robot
+    drives = load_drive_parts(path, robot.drives)
+    return dataclasses.replace(robot, drives=drives)
 
 
 def with_payload(robot: ElasticRobot, numbers: tuple[float, ...] | None):
@@ -158,6 +173,7 @@ def with_payload(robot: ElasticRobot, numbers: tuple[float, ...] | None):
 
 def compile_programs(
     robot: ElasticRobot,
+    plant: ElasticRobot,
     reference: Reference,
     names: tuple[str, ...],
     progress: Progress,
@@ -171,8 +187,8 @@ def compile_programs(
     controller = CascadeMotorControl()
     # a failed simulation shows in its figures; an error raised from inside the program
     # would keep it out of the persistent cache
-    plant = lambda p, c, r: run_command(p, c, r, controller, throw=False)
-    jobs: dict[str, tuple] = {"elastic plant": (plant, robot, command, reference)}
+    drive = lambda p, c, r: run_command(p, c, r, controller, throw=False)
+    jobs: dict[str, tuple] = {"elastic plant": (drive, plant, command, reference)}
     for name in names:
         inverse = INVERSES[name].feedforward
         jobs[f"{name} feed-forward"] = (inverse, robot, reference)
@@ -193,7 +209,11 @@ def bare(command: MotorCommand) -> MotorCommand:
 
 
 def run_all(
-    robot: ElasticRobot, reference: Reference, programs: Compiled, progress: Progress
+    robot: ElasticRobot,
+    plant: ElasticRobot,
+    reference: Reference,
+    programs: Compiled,
+    progress: Progress,
 ) -> tuple[dict[str, Run], dict[str, dict]]:
     """Every feed-forward on the plant, and what a sample of it costs."""
     runs, cost = {}, {}
@@ -203,7 +223,7 @@ def run_all(
         start = time.perf_counter()
         jax.block_until_ready(program(robot, reference))
         seconds = (time.perf_counter() - start) / reference.times.shape[0]
-        simulation, judgement = programs.plant(robot, bare(command), reference)
+        simulation, judgement = programs.plant(plant, bare(command), reference)
         runs[name] = Run(command, simulation, judgement)
         cost[name] = {"seconds_per_sample": seconds}
     return runs, cost

@@ -16,6 +16,7 @@ from ._motion import (
     move_reference,
     point_to_point,
     reference_filter,
+    reference_order,
     resolve_pose,
     rounded,
     settling,
@@ -86,7 +87,8 @@ def run_grid(
     moves = np.array([[_move(robot, pose, move) for pose in poses] for move in MOVES])
     starts = np.broadcast_to(poses, moves.shape).reshape(-1, robot.axes)
     flat = moves.reshape(-1, robot.axes)
-    filter = reference_filter(config)
+    order = reference_order(robot)
+    filter = reference_filter(config, order)
     start, move = jnp.asarray(np.deg2rad(starts)), jnp.asarray(np.deg2rad(flat))
     longest = jax.jit(
         lambda robot: jax.vmap(lambda s, m: point_to_point(robot, s, m).duration)(
@@ -98,7 +100,7 @@ def run_grid(
 
     def case(robot, inverse, start, move):
         profile = point_to_point(robot, start, move)
-        reference = move_reference(profile, filter, duration)
+        reference = move_reference(profile, filter, duration, order)
         run = run_feedforward(robot, robot, inverse, reference, controller, throw=False)
         return run.judgement.criterion, run.judgement.path_error_integral
 

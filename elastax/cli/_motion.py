@@ -22,7 +22,7 @@ from ._arguments import FeedforwardConfig
 
 
 DT = 1e-3  # [s], rate of the reference
-ORDER = 4  # derivatives of the reference
+ORDER = 4  # derivatives of the reference for motors without a lag
 HOLD = 0.95  # [s] at rest after the motion, for the window of the criterion
 OVERSAMPLING = 8
 PATH_SPEED, PATH_ACCELERATION, PATH_JERK = 0.5, 3.0, 30.0  # m/s, m/s^2, m/s^3
@@ -49,15 +49,20 @@ class Motion:
     notes: tuple[str, ...]
 
 
-def reference_filter(config: FeedforwardConfig) -> BesselFilter:
+def reference_order(robot: ElasticRobot) -> int:
+    """Derivatives of the reference that every inverse of the robot can have."""
+    return ORDER + robot.drives.extra_order
+
+
+def reference_filter(config: FeedforwardConfig, order: int = ORDER) -> BesselFilter:
     """Filter that delivers the derivatives of the reference.
 
     Raises:
         ValueError: its order is too low for the inverses.
     """
-    if config.filter_order < ORDER:
+    if config.filter_order < order:
         raise ValueError(
-            f"the filter order must be at least {ORDER}, for as many derivatives of "
+            f"the filter order must be at least {order}, for as many derivatives of "
             f"the reference, but is {config.filter_order}: give --filter-order 6"
         )
     return BesselFilter(config.filter_order, config.cutoff)
@@ -126,7 +131,7 @@ def build_motion(robot: ElasticRobot, config: FeedforwardConfig) -> Motion:
     Raises:
         ValueError: pose or move outside the limits, unreachable path, wrong file.
     """
-    filter = reference_filter(config)
+    filter = reference_filter(config, reference_order(robot))
     start = resolve_pose(robot, config.pose)
     check_limits(robot, start, "the pose")
     if config.path is not None:
@@ -146,7 +151,8 @@ def build_motion(robot: ElasticRobot, config: FeedforwardConfig) -> Motion:
         robot, jnp.asarray(np.deg2rad(start)), jnp.asarray(np.deg2rad(move))
     )
     duration = rounded(float(profile.duration) + settling(filter))
-    reference = eqx.filter_jit(move_reference)(profile, filter, duration)
+    order = reference_order(robot)
+    reference = eqx.filter_jit(move_reference)(profile, filter, duration, order)
     return Motion(reference, start, move, None, tuple(notes))
 
 
@@ -163,7 +169,7 @@ def point_to_point(robot: ElasticRobot, start, move) -> PointToPoint:
 
 
 def move_reference(
-    profile: PointToPoint, filter: BesselFilter, duration: float
+    profile: PointToPoint, filter: BesselFilter, duration: float, order: int
 ) -> Reference:
     """Filtered reference of a profile over `duration` [s]."""
     return Reference.from_position_function(
@@ -171,7 +177,7 @@ def move_reference(
         duration,
         DT,
         filter=filter,
-        order=ORDER,
+        order=order,
         oversampling=OVERSAMPLING,
     )
 
@@ -217,7 +223,7 @@ def _path_motion(robot, config, filter, start) -> Motion:
 
     @jax.jit
     def filtered(joints):
-        dense = filter.apply(joints, fine, ORDER)
+        dense = filter.apply(joints, fine, reference_order(robot))
         return dense[:, ::OVERSAMPLING]
 
     reference = Reference(times[::OVERSAMPLING], filtered(joints))

@@ -52,6 +52,7 @@ def scale_payload(robot: ElasticRobot, factor: float) -> ElasticRobot:
 
 def run_perturbed(
     robot: ElasticRobot,
+    plant: ElasticRobot,
     reference: Reference,
     programs,
     nominal: dict[str, Run],
@@ -78,6 +79,6 @@ def run_perturbed(
         table[case] = {}
         for name, program in programs.inverses.items():
             command = program(model, reference)
-            _, judgement = programs.plant(robot, bare(command), reference)
+            _, judgement = programs.plant(plant, bare(command), reference)
             table[case][name] = figures(judgement)
     return table

@@ -15,7 +15,7 @@ from ..identification import (
 from ..io import load_recording
 from ..signals import Reference
 from ._arguments import FeedforwardConfig
-from ._motion import HOLD, Motion, reference_filter
+from ._motion import HOLD, Motion, reference_filter, reference_order
 from ._progress import Progress
 
 
@@ -31,7 +31,7 @@ def run_recording(
     """
     assert config.recording is not None
     recording = load_recording(config.recording)
-    filter = reference_filter(config)
+    filter = reference_filter(config, reference_order(robot))
     fit = True
     if config.identify_on is not None:
         progress.say(f"fitting friction on {pathlib.Path(config.identify_on).name} ...")

@@ -12,6 +12,7 @@ from ._branch import (
     AbstractSwitchingBranch as AbstractSwitchingBranch,
     RelaxationBranch as RelaxationBranch,
 )
+from ._clutch import FrictionContact as FrictionContact
 from ._counterbalance import (
     AbstractCounterbalance as AbstractCounterbalance,
     GasCounterbalance as GasCounterbalance,
@@ -29,6 +30,27 @@ from ._friction import (
     TemperatureFriction as TemperatureFriction,
     TwoScaleFriction as TwoScaleFriction,
 )
+from ._hysteresis import (
+    AbstractSmoothPlay as AbstractSmoothPlay,
+    DelayedPlay as DelayedPlay,
+    PadeDelay as PadeDelay,
+    PrandtlIshlinskii as PrandtlIshlinskii,
+    RateIndependentPlay as RateIndependentPlay,
+    play as play,
+)
+from ._hysteretic_branch import (
+    ExactStopBranch as ExactStopBranch,
+    HysteresisBranch as HysteresisBranch,
+    StopBranch as StopBranch,
+)
 from ._mesh import AbstractMesh as AbstractMesh
 from ._motor import Motor as Motor
+from ._switching_friction import (
+    AbstractSwitchingFriction as AbstractSwitchingFriction,
+    StickSlipFriction as StickSlipFriction,
+)
+from ._switching_mesh import (
+    AbstractSwitchingMesh as AbstractSwitchingMesh,
+    ExactEfficiency as ExactEfficiency,
+)
 from ._transmission_error import TransmissionError as TransmissionError

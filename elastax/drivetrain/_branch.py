@@ -3,12 +3,13 @@ r"""Elements with memory that stand parallel to the spring and the damper of a g
 A branch adds a torque $b(x, z)$ to that of the gear's spring. It depends on the torsion
 $x = q - \theta$ and on internal states $z$ of its own, but not on the rate of the
 torsion: with the linear damper $d > 0$ of the gear the torque
-$\tau = k(x) + d\,\dot x + b(x, z)$ is solved for $\dot x$, and $\dot z$ follows from it.
+$\tau = k(x) + d\,\dot x + b(x, z)$ is solved for $\dot x$, and $\dot z$ follows.
 So a gear with branches has an exact inverse, the states of which are $x$ and $z$.
 """
 
 import abc
 import dataclasses
+from collections.abc import Callable
 
 import equinox as eqx
 import jax
@@ -19,6 +20,8 @@ from .._checks import check_fields, check_values
 from .._custom_types import PerJoint, as_real
 from ..structure import AbstractStiffness
 
+
+MemoryPath = Callable[[PerJoint, Array, PerJoint], Array]
 
 _NEWTON_STEPS = 8
 
@@ -57,8 +60,16 @@ class AbstractGearBranch(eqx.Module):
         """Time derivative of `memory` at `torsion` [rad] and its `rate` [rad/s]."""
 
     @abc.abstractmethod
+    def path(self) -> MemoryPath | None:
+        """How the memory follows the torsion alone, or `None` where it takes time.
+
+        The function takes the torsion and the memory at the start of a monotone motion
+        and the torsion at its end, and returns the memory there.
+        """
+
+    @abc.abstractmethod
     def scaled(self, factor: Float[Array, "..."] | float) -> "AbstractGearBranch":
-        """The branch beside the spring `scaled` alike: its torque times `factor` > 0."""
+        """The branch beside a spring `scaled` alike: its torque times `factor`."""
 
 
 class AbstractSwitchingBranch(eqx.Module):
@@ -100,7 +111,7 @@ class AbstractSwitchingBranch(eqx.Module):
 
     @abc.abstractmethod
     def scaled(self, factor: Float[Array, "..."] | float) -> "AbstractSwitchingBranch":
-        """The branch beside the spring `scaled` alike: its torque times `factor` > 0."""
+        """The branch beside a spring `scaled` alike: its torque times `factor`."""
 
 
 class RelaxationBranch(AbstractGearBranch):
@@ -108,10 +119,10 @@ class RelaxationBranch(AbstractGearBranch):
 
     $$b = c_2\,(x - z),\qquad c_2\,(x - z) = c_3(z) + d_z\,\dot z$$
 
-    Parallel to the spring $c_1$ of the gear stands the soft spring $c_2$, in series with
-    the parallel pair of the spring $c_3$ and a damper. Slow motion meets $c_1$ and the
-    series of $c_2$ and $c_3$, fast motion $c_1 + c_2$; in between energy is lost. The
-    stored energy is that of $c_2$ and $c_3$, the loss $d_z \dot z^2 \ge 0$.
+    Parallel to the spring $c_1$ of the gear stands the soft spring $c_2$, in series
+    with the parallel pair of the spring $c_3$ and a damper. Slow motion meets $c_1$ and
+    the series of $c_2$ and $c_3$, fast motion $c_1 + c_2$; in between energy is lost.
+    The stored energy is that of $c_2$ and $c_3$, the loss $d_z \dot z^2 \ge 0$.
 
     The text describes the elements of its figure 2.5b, but not how they are connected;
     this arrangement is the one that its words suggest, without proof. The damper of the
@@ -160,6 +171,9 @@ class RelaxationBranch(AbstractGearBranch):
         (inner,) = memory
         load = self.coupling * (torsion - inner) - self.relaxed.torque(inner)
         return (load / self.viscosity)[None]
+
+    def path(self) -> None:
+        return None
 
     def scaled(self, factor: Float[Array, "..."] | float) -> "RelaxationBranch":
         return dataclasses.replace(

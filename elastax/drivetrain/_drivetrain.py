@@ -12,10 +12,12 @@ from .._checks import check_fields, check_values
 from .._custom_types import PerJoint, as_real
 from .._taylor import compose
 from ..structure import AbstractStiffness
-from ._branch import AbstractGearBranch
+from ._branch import AbstractGearBranch, AbstractSwitchingBranch
 from ._friction import AbstractFriction
 from ._mesh import AbstractMesh
 from ._motor import Motor
+from ._switching_friction import AbstractSwitchingFriction
+from ._switching_mesh import AbstractSwitchingMesh
 from ._transmission_error import TransmissionError
 
 
@@ -39,7 +41,8 @@ class DriveTrain(eqx.Module):
 
     $\tau_g$ acts on the motor and, with the opposite sign, on the link. The gyroscopic
     coupling of the rotors to the structure is neglected, as in the text. Parts are
-    swapped by `dataclasses.replace`, or for a robot by `robot.with_drives`.
+    swapped by `dataclasses.replace`, or for a robot by `robot.with_drives`. Exact parts
+    whose equations switch are for plants: `simulate` takes them, the inverses do not.
 
     Attributes:
         ratio: gear ratios motor / output, shape (joints,); the sign is kept.
@@ -61,10 +64,10 @@ class DriveTrain(eqx.Module):
     motor: Motor
     stiffness: AbstractStiffness | None
     damping: PerJoint = eqx.field(converter=as_real)
-    motor_friction: AbstractFriction
+    motor_friction: AbstractFriction | AbstractSwitchingFriction
     joint_friction: AbstractFriction
-    branch: AbstractGearBranch | None = None
-    mesh: AbstractMesh | None = None
+    branch: AbstractGearBranch | AbstractSwitchingBranch | None = None
+    mesh: AbstractMesh | AbstractSwitchingMesh | None = None
     transmission_error: TransmissionError | None = None
 
     def __check_init__(self):
@@ -86,6 +89,17 @@ class DriveTrain(eqx.Module):
     def memory_states(self) -> int:
         """Number of states per axis that the gear's branch remembers."""
         return 0 if self.branch is None else self.branch.states
+
+    @property
+    def sticks(self) -> bool:
+        """Whether the motors can stick: dry friction or teeth with a jump at rest."""
+        dry = isinstance(self.motor_friction, AbstractSwitchingFriction)
+        return dry or isinstance(self.mesh, AbstractSwitchingMesh)
+
+    @property
+    def switches(self) -> bool:
+        """Whether a part is exact and switches, so that only plants may have it."""
+        return self.sticks or isinstance(self.branch, AbstractSwitchingBranch)
 
     @property
     def extra_order(self) -> int:
@@ -122,9 +136,13 @@ class DriveTrain(eqx.Module):
         self, torsion: PerJoint, torsion_rate: PerJoint, memory: GearMemory
     ) -> GearMemory:
         """Rates of the branch's memory; empty without a branch."""
-        if self.branch is None:
-            return memory
-        return self.branch.rates(torsion, torsion_rate, memory)
+        match self.branch:
+            case None:
+                return memory
+            case AbstractSwitchingBranch():
+                return jnp.zeros_like(memory)  # renewed after every step
+            case branch:
+                return branch.rates(torsion, torsion_rate, memory)
 
     def resting_memory(self, torsion: PerJoint) -> GearMemory:
         """Memory of a gear that was never loaded beyond `torsion` and rests there."""
@@ -161,26 +179,64 @@ class DriveTrain(eqx.Module):
         angle = self.transmission_error.output_angle(theta)
         return angle, thetad / self._speed_ratio(angle)
 
-    def motor_load(self, gear: PerJoint, angle: PerJoint, thetad: PerJoint) -> PerJoint:
+    def motor_load(
+        self,
+        gear: PerJoint,
+        angle: PerJoint,
+        thetad: PerJoint,
+        direction: PerJoint | None = None,
+    ) -> PerJoint:
         """What gear and friction ask of the motor: `h_m` [N m].
 
         Args:
             gear: torque of the gear, `gear_torque` [N m].
             angle: behind the teeth [rad].
             thetad: motor speed [rad/s].
+            direction: of the motion, +1 or -1, for parts that switch. Without it their
+                friction is left out: at rest it is whatever keeps the motor there.
 
         References:
-            [Reiner2010] (2.3), (2.6c), (2.11), (2.38).
+            [Reiner2010] (2.3), (2.6c), (2.10), (2.11), (2.38).
         """
-        return self.motor_friction.torque(thetad) + self._drive(-gear, angle, thetad)
+        drive = self._drive(-gear, angle, thetad, direction)
+        match self.motor_friction:
+            case AbstractSwitchingFriction() as dry:
+                if direction is None:
+                    return drive
+                return dry.torque(thetad, direction) + drive
+            case friction:
+                return friction.torque(thetad) + drive
 
-    def _drive(self, load, angle, thetad):
+    def breakaway(
+        self, gear: PerJoint, angle: PerJoint, direction: PerJoint
+    ) -> PerJoint:
+        """Motor torque [N m] at which a sticking motor starts in a direction.
+
+        Args:
+            gear: torque of the gear [N m].
+            angle: behind the teeth [rad].
+            direction: +1 or -1.
+        """
+        drive = self._drive(-gear, angle, 0.0 * angle, direction)
+        match self.motor_friction:
+            case AbstractSwitchingFriction() as dry:
+                return dry.breakaway(direction) + drive
+            case friction:
+                return friction.torque(0.0 * angle) + drive
+
+    def _drive(self, load, angle, thetad, direction):
         """Torque that drives the teeth when they hand on `load`."""
         if self.transmission_error is not None:
             load = load / self._speed_ratio(angle)  # no loss: equal powers
-        if self.mesh is None:
-            return load
-        return self.mesh.drive_torque(load, thetad)
+        match self.mesh:
+            case None:
+                return load
+            case AbstractSwitchingMesh() as exact:
+                if direction is None:
+                    return load
+                return exact.drive_torque(load, thetad, direction)
+            case mesh:
+                return mesh.drive_torque(load, thetad)
 
     def _speed_ratio(self, angle):
         """Motor speed over the speed behind the teeth, one for an ideal ratio."""

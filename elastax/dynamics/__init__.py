@@ -56,4 +56,9 @@ from ._simulate import (
     resting_state as resting_state,
     simulate as simulate,
 )
+from ._switching import (
+    AbstractSwitchingSystem as AbstractSwitchingSystem,
+    SwitchingResult as SwitchingResult,
+    simulate_switching as simulate_switching,
+)
 from ._tool_state import tool_state as tool_state

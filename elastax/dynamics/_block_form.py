@@ -97,14 +97,17 @@ def equations_of_motion(
 
 
 @kernel
-def _loads(robot: ElasticRobot, q, eta, theta, qd, etad, thetad, tau_m, memory):
+def _loads(robot: ElasticRobot, q, eta, theta, qd, etad, thetad, tau_m, memory, mode):
     """Forces on joints and structure besides those of the bodies, on the motors."""
     joint, structure = applied_forces(robot, q, eta, qd, etad)
     if not robot.has_elastic_gears:
         driven = tau_m - rigid_motor_load(robot, qd) - joint
         return jnp.concatenate([driven, -structure]), tau_m
-    gear, h_m = gear_loads(robot, q, theta, qd, thetad, memory)
-    return jnp.concatenate([-joint - gear, -structure]), tau_m - h_m
+    gear, h_m = gear_loads(robot, q, theta, qd, thetad, memory, mode)
+    motor = tau_m - h_m
+    if mode is not None:
+        motor = jnp.where(mode == 0.0, 0.0, motor)
+    return jnp.concatenate([-joint - gear, -structure]), motor
 
 
 @kernel
@@ -118,6 +121,7 @@ def forward_dynamics(
     thetad: PerJoint,
     tau_m: PerJoint,
     memory: GearMemory | None = None,
+    mode: PerJoint | None = None,
 ) -> tuple[PerJoint, PerElastic, PerJoint]:
     """Accelerations of joints, structure and motors under the motor torque `tau_m`.
 
@@ -125,13 +129,15 @@ def forward_dynamics(
         robot: the robot.
         q, eta, theta, qd, etad, thetad, memory: as for `equations_of_motion`.
         tau_m: motor torques on the output side [N m], shape (axes,).
+        mode: for drive trains that switch, +1 or -1 where the motor moves in that
+            direction, 0 where it sticks, whatever torque acts; shape (axes,).
 
     Returns:
         qdd (axes,), etadd (elastic,), thetadd (axes,) [rad/s^2]; for rigid gears
         thetadd equals qdd.
     """
     state = q, eta, theta, qd, etad, thetad
-    force, motor = _loads(robot, *state, tau_m, memory)
+    force, motor = _loads(robot, *state, tau_m, memory, mode)
     rotors = None if robot.has_elastic_gears else robot.drives.reflected_inertia()
     acceleration = body_accelerations(robot, q, eta, qd, etad, force, rotors)
     qdd, etadd = acceleration[: robot.axes], acceleration[robot.axes :]

@@ -130,13 +130,13 @@ def state_parts(
     return LoopState(*(part.reshape(shape) for part, shape in zip(parts, shapes)))
 
 
-def _driven(robot: ElasticRobot, controller, setpoint: MotorSetpoint, x: State):
+def driven(robot: ElasticRobot, controller, setpoint: MotorSetpoint, x: State, mode):
     """State with the motors' motion, torques of motors, gears and of the command."""
     state = state_parts(robot, controller, x)
     theta, thetad = controller.motors(setpoint, state.theta, state.thetad)
     state = state._replace(theta=theta, thetad=thetad)
     q, qd = state.q, state.qd
-    gear, load = gear_loads(robot, q, theta, qd, thetad, state.gear)
+    gear, load = gear_loads(robot, q, theta, qd, thetad, state.gear, mode)
     inertia = robot.drives.reflected_inertia()
     loop = (setpoint, theta, thetad, inertia, load)
     command = controller.torque(*loop, state.controller)
@@ -150,6 +150,7 @@ def rates(
     controller: AbstractMotorController,
     setpoint: MotorSetpoint,
     x: State,
+    mode: PerJoint | None = None,
 ) -> State:
     """Time derivative of the state of `LoopState`, x = (q, eta, theta, qd, ...).
 
@@ -158,12 +159,13 @@ def rates(
         controller: closes the loop at the motors.
         setpoint: what the feed-forward asks for now.
         x: state [rad, rad/s], shape (2 (2 axes + elastic) + memories,).
+        mode: of the motors where their drive trains switch, see `forward_dynamics`.
 
     References:
         [Reiner2010] (2.2), (2.38).
     """
-    state, tau_m, _, command = _driven(robot, controller, setpoint, x)
-    accelerations = forward_dynamics(robot, *state[:6], tau_m, state.gear)
+    state, tau_m, _, command = driven(robot, controller, setpoint, x, mode)
+    accelerations = forward_dynamics(robot, *state[:6], tau_m, state.gear, mode)
     q, _, theta, qd, etad, thetad, gear, torque, memory = state
     if robot.drives.motor.lag is not None:
         torque = robot.drives.motor.torque_rate(torque, command)
@@ -184,10 +186,11 @@ def observe(
     controller: AbstractMotorController,
     setpoint: MotorSetpoint,
     x: State,
+    mode: PerJoint | None = None,
 ):
     """What `SimulationResult` shows of a state, in the order of its fields."""
-    state, tau_m, gear, _ = _driven(robot, controller, setpoint, x)
-    accelerations = forward_dynamics(robot, *state[:6], tau_m, state.gear)
+    state, tau_m, gear, _ = driven(robot, controller, setpoint, x, mode)
+    accelerations = forward_dynamics(robot, *state[:6], tau_m, state.gear, mode)
     q, eta, _, qd, etad, _ = state[:6]
     qdd, etadd, _ = accelerations
     tool = tool_state(robot, q, eta, qd, etad, qdd, etadd)

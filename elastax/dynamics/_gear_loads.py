@@ -12,6 +12,7 @@ def gear_loads(
     qd: PerJoint,
     thetad: PerJoint,
     memory: GearMemory | None = None,
+    mode: PerJoint | None = None,
 ) -> tuple[PerJoint, PerJoint]:
     """Torques of elastic gears and what they ask of the motors.
 
@@ -20,6 +21,7 @@ def gear_loads(
         q, qd: joint angles [rad] and velocities.
         theta, thetad: motor angles [rad] and velocities.
         memory: of the gears' branch, (states, axes).
+        mode: direction of the motors' motion, +1 or -1, for parts that switch.
 
     Returns:
         Torque of the gears, that of springs, dampers and branches, and `h_m` with the
@@ -31,7 +33,7 @@ def gear_loads(
     drives = robot.drives
     angle, speed = drives.motion_behind_teeth(theta, thetad)
     gear = drives.gear_torque(q - angle, qd - speed, memory)
-    return gear, drives.motor_load(gear, angle, thetad)
+    return gear, drives.motor_load(gear, angle, thetad, mode)
 
 
 def gear_memory_rates(

@@ -1,6 +1,7 @@
 """The elastic robot: chain, bodies, springs, drive trains and what its maker says."""
 
 import dataclasses
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -232,6 +233,20 @@ class ElasticRobot(eqx.Module):
         }
         axis_joints = tuple(joints[k] for k in range(self.axes))
         return DeformableArm(self.chain, self.coupling(), axis_joints)
+
+    def with_drives(self, **parts: Any) -> "ElasticRobot":
+        """The same robot with other parts in its drive trains.
+
+        Args:
+            parts: attributes of `DriveTrain` by name.
+
+        Examples:
+            >>> stribeck = StribeckFriction(viscous, coulomb, steepness, a, c)
+            >>> robot = kr210().with_drives(motor_friction=stribeck)
+        """
+        return dataclasses.replace(
+            self, drives=dataclasses.replace(self.drives, **parts)
+        )
 
     def with_payload(self, mass, com, inertia) -> "ElasticRobot":
         """The same robot with another payload.

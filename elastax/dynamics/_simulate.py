@@ -20,6 +20,8 @@ from ._command import CommandInterpolant, MotorCommand, MotorSetpoint
 from ._equilibrium import static_load
 from ._gear_loads import resting_loads
 from ._robot import ElasticRobot
+from ._switching import simulate_switching
+from ._switching_loop import SwitchingLoop
 
 
 _RATE = 10.0  # [1/s], absolute tolerance of speeds over that of angles
@@ -43,6 +45,8 @@ class SimulationResult(eqx.Module):
             rotation, (times, 6).
         wrist_acceleration: of the wrist centre, base frame, (times, 3) [m/s^2].
         steps: accepted and rejected steps of the solver.
+        modes: of motors that can stick, +1, -1 for their direction and 0 at rest,
+            (times, axes); `None` where no part switches.
     """
 
     times: Times
@@ -62,6 +66,7 @@ class SimulationResult(eqx.Module):
     tool_acceleration: Float[Array, "times 6"]
     wrist_acceleration: Float[Array, "times 3"]
     steps: Int[Array, ""]
+    modes: Float[Array, "times axes"] | None = None
 
 
 def simulate(
@@ -80,6 +85,10 @@ def simulate(
     throw: bool = True,
 ) -> SimulationResult:
     """Motion of the robot that a command and a motor controller cause.
+
+    Plants with parts that switch, such as dry friction, are integrated from event to
+    event (`simulate_switching`); they take explicit Runge-Kutta methods, tolerances and
+    `step` alone, and their result is not differentiated.
 
     Starts from the static equilibrium of robot and loop at the first sample; after the
     last sample the command holds on.
@@ -132,6 +141,18 @@ def simulate(
         return rates(robot, controller, setpoint(t), x)
 
     start = resting_loop(robot, setpoint(times[0]), controller)
+    if robot.drives.switches:
+        return _simulate_switching(
+            SwitchingLoop(robot, controller, setpoint),
+            start.vector(),
+            times,
+            solver=solver,
+            step=step,
+            rtol=rtol,
+            atol=atol * jnp.asarray(_scales(robot, controller), times.dtype),
+            max_steps=max_steps,
+            throw=throw,
+        )
     solution = dfx.diffeqsolve(
         dfx.ODETerm(vector_field),
         solver,
@@ -150,6 +171,19 @@ def simulate(
         times, solution.ys
     )
     return SimulationResult(times, *observed, steps=solution.stats["num_steps"])
+
+
+def _simulate_switching(system: SwitchingLoop, x0, times, **options):
+    """The same for drive trains with parts that switch, motors at rest first."""
+    rest = jnp.zeros((system.robot.axes,), x0.dtype)
+    motion = simulate_switching(system, x0, rest, times, **options)
+
+    def observed(t, x, mode):
+        given = mode if system.robot.drives.sticks else None
+        return observe(system.robot, system.controller, system.setpoint(t), x, given)
+
+    shown = jax.vmap(observed)(times, motion.x, motion.mode)
+    return SimulationResult(times, *shown, steps=motion.steps, modes=motion.mode)
 
 
 def _scales(robot: ElasticRobot, controller: AbstractMotorController) -> np.ndarray:

@@ -20,7 +20,11 @@ from ._damping_signal import (
     FilteredDamping as FilteredDamping,
     FrozenDamping as FrozenDamping,
 )
-from ._drive import DriveState as DriveState, motor_motion as motor_motion
+from ._drive import (
+    DriveState as DriveState,
+    GearState as GearState,
+    motor_motion as motor_motion,
+)
 from ._export import export_step as export_step
 from ._flexible_joint import FlexibleJointInverse as FlexibleJointInverse
 from ._response import advance as advance, response as response

@@ -114,18 +114,31 @@ def advance_gear(
     References:
         [Reiner2010] (3.93a) in the relative angle.
     """
-    if drives.branch is None:
-        torsion = _advance_torsion(drives, gear.torsion, before, after, dt)
-        return GearState(torsion, gear.memory)
+    if drives.branch is None or drives.branch.path() is not None:
+        return _advance_on_path(drives, gear, before, after, dt)
     field = gear_field(drives, drives.branch)
     now = advance_memory(field, gear.augmented(), -before, -after, dt)
     return GearState(now[0], now[1:])
 
 
 @kernel
-def _advance_torsion(drives: DriveTrain, torsion, before, after, dt):
-    spring = gear_spring(drives).torque
-    return advance(spring, drives.damping, torsion, -before, -after, dt)
+def _advance_on_path(drives: DriveTrain, gear: GearState, before, after, dt):
+    """The torsion alone is integrated: the memory, if any, follows it."""
+
+    def memory(torsion):
+        if drives.branch is None:
+            return gear.memory
+        return drives.branch.path()(gear.torsion, gear.memory, torsion)
+
+    def spring(torsion):
+        return drives.gear_torque(torsion, 0.0 * torsion, memory(torsion))
+
+    if drives.branch is None:
+        spring = gear_spring(drives).torque
+    else:  # plays turn within a sample: a higher order would see their corners
+        before, after = before.truncated(1), after.truncated(1)
+    torsion = advance(spring, drives.damping, gear.torsion, -before, -after, dt)
+    return GearState(torsion, memory(torsion))
 
 
 def gears_along(

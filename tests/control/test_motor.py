@@ -19,22 +19,26 @@ THETA, SPEED = jnp.array([0.29, 0.12]), jnp.array([0.8, -1.9])
 INERTIA, LOAD = jnp.array([2.0, 3.0]), jnp.array([40.0, -20.0])
 
 
+# the memory of controllers without one
+NONE = jnp.zeros((0, 2))
+
+
 def test_cascade_law():
     controller = CascadeMotorControl(50.0, 12.0)
-    tau = controller.torque(SETPOINT, THETA, SPEED, INERTIA, LOAD)
+    tau = controller.torque(SETPOINT, THETA, SPEED, INERTIA, LOAD, NONE)
     speed = np.array([0.2, -0.1]) + 12.0 * np.array([0.01, -0.02])
     assert_close(tau, [70.0, 80.0] + np.array([2.0, 3.0]) * 50.0 * speed, rtol=1e-13)
     assert_close(controller.motors(SETPOINT, THETA, SPEED), (THETA, SPEED), rtol=0)
     # at rest the loop carries what the feed-forward leaves
     rest = controller.resting_motors(SETPOINT, LOAD, INERTIA)
     still = MotorSetpoint(SETPOINT.theta, 0 * SPEED, 0 * SPEED, SETPOINT.tau_m)
-    held = controller.torque(still, rest, 0 * SPEED, INERTIA, LOAD)
+    held = controller.torque(still, rest, 0 * SPEED, INERTIA, LOAD, NONE)
     assert_close(held, LOAD, rtol=1e-12)
 
 
 def test_ideal_law():
     controller = IdealMotorControl()
-    tau = controller.torque(SETPOINT, THETA, SPEED, INERTIA, LOAD)
+    tau = controller.torque(SETPOINT, THETA, SPEED, INERTIA, LOAD, NONE)
     assert_close(tau, INERTIA * SETPOINT.thetadd + LOAD, rtol=0)
     assert_close(
         controller.motors(SETPOINT, THETA, SPEED),
@@ -84,7 +88,7 @@ def test_damping_of_a_free_rotor():
     def acceleration(theta, thetad):
         zero = MotorSetpoint(*(jnp.zeros((1,)) for _ in range(4)))
         one = jnp.ones((1,))
-        return controller.torque(zero, theta, thetad, one, one)[0]
+        return controller.torque(zero, theta, thetad, one, one, NONE[:, :1])[0]
 
     zero = jnp.zeros((1,))
     position, speed = jax.grad(acceleration, argnums=(0, 1))(zero, zero)

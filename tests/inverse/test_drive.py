@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from elastax._taylor import from_derivatives
-from elastax.inverse import FlexibleJointInverse, motor_motion
+from elastax.inverse import FlexibleJointInverse, GearState, motor_motion
 from elastax.structure import LimitedStiffness
 
 from tests import systems
@@ -31,7 +31,8 @@ def test_inverse_drive_train_of_the_vectors():
     q = from_derivatives(u[:3, None])
     load = from_derivatives(u[3:, None])
     torsion = u[:1] - given["x"]
-    sample = jax.jit(motor_motion)(drives, q, load, torsion, jnp.zeros((0,)))
+    gear = GearState(torsion, drives.resting_memory(torsion))
+    sample = jax.jit(motor_motion)(drives, q, load, gear, jnp.zeros((0,)))
     actual = [sample.theta, sample.thetad, sample.thetadd, sample.tau_m]
     # the inputs are rounded to 13 digits, which the acceleration sees through the
     # stiffness over the damping twice
@@ -40,8 +41,8 @@ def test_inverse_drive_train_of_the_vectors():
     bounds = np.array([0.0, 0.0, rounding, given["Theta"] * rounding])
     error = np.abs(np.concatenate(actual) - np.array(desired["y"]))
     assert np.all(error <= tol * np.abs(desired["y"]) + bounds), (error, bounds)
-    gear = drives.stiffness.torque(torsion)
-    assert_close(gear, [desired["tau_getr"]], rtol=tol)
+    spring = drives.stiffness.torque(torsion)
+    assert_close(spring, [desired["tau_getr"]], rtol=tol)
     friction = drives.motor_friction.torque(sample.thetad)
     assert_close(friction, [desired["tau_reib"]], rtol=tol)
     # what the gear gives is what the load takes
