@@ -26,6 +26,7 @@ def test_table_6_1(capsys):
     assert "0.5744" in printed and "difference" in printed
 
 
+@pytest.mark.slow
 def test_figure_2_3(tmp_path, capsys):
     script = load("Reiner2010/figure_2_3.py")
     ours = script.main(tmp_path / "figure.png")

@@ -110,7 +110,9 @@ def _figure(law):
         *[part[:2] for part in crossing.get_legend_handles_labels()],
         loc="lower right",
         fontsize=9,
-        frameon=False,
+        facecolor="white",
+        edgecolor="none",
+        framealpha=1.0,
     )
     return figure
 
