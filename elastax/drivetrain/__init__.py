@@ -2,6 +2,7 @@
 
 from ..structure import (
     AbstractStiffness as AbstractStiffness,
+    AxisStiffness as AxisStiffness,
     BacklashStiffness as BacklashStiffness,
     CubicStiffness as CubicStiffness,
     ExponentialStiffness as ExponentialStiffness,
@@ -9,6 +10,7 @@ from ..structure import (
     LinearStiffness as LinearStiffness,
     TabulatedStiffness as TabulatedStiffness,
 )
+from ._backlash import Backlash as Backlash
 from ._branch import (
     AbstractGearBranch as AbstractGearBranch,
     AbstractSwitchingBranch as AbstractSwitchingBranch,
@@ -28,7 +30,13 @@ from ._efficiency import (
 )
 from ._friction import (
     AbstractFriction as AbstractFriction,
+    AsymmetricFriction as AsymmetricFriction,
+    AxisFriction as AxisFriction,
+    BreakawayFriction as BreakawayFriction,
     CoulombViscousFriction as CoulombViscousFriction,
+    PiecewiseFriction as PiecewiseFriction,
+    StribeckFriction as StribeckFriction,
+    TemperatureFriction as TemperatureFriction,
     TwoScaleFriction as TwoScaleFriction,
 )
 from ._hysteresis import (

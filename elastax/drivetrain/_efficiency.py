@@ -46,9 +46,9 @@ class FallingEfficiency(AbstractEfficiency):
     r"""Efficiency that falls with the speed to a floor, smoothly.
 
     $\eta = \mathrm{smax}_\psi(\eta_0 - k\,|\omega|_\varepsilon,\ \eta_{min})$ with
-    $|\omega|_\varepsilon = \sqrt{\omega^2 + \varepsilon^2} - \varepsilon$. The law of the
-    text's figure 2.4, $\eta_0 - k|\omega|$, has a corner at rest and runs through zero;
-    the floor keeps it positive. The soft maximum exceeds by up to $\ln 2/\psi$.
+    $|\omega|_\varepsilon = \sqrt{\omega^2 + \varepsilon^2} - \varepsilon$. The law of
+    the text's figure 2.4, $\eta_0 - k|\omega|$, has a corner at rest and runs through
+    zero; the floor keeps it positive. The soft maximum exceeds by up to $\ln 2/\psi$.
 
     Attributes:
         at_rest: $\eta_0$, in (0, 1] [-].

@@ -152,9 +152,9 @@ class LoadFriction(AbstractMesh):
     $$\tau_A = \tau_B + \tanh(s\omega/2)\,\bigl[\mu + \mu_s e^{-(\omega/\omega_s)^2}
       \bigr]\,|\tau_B|_\varepsilon$$
 
-    with $|\tau|_\varepsilon = \sqrt{\tau^2 + \varepsilon^2} - \varepsilon$. The text names
-    the dependence on the load as the fourth part of friction and leaves it out, as
-    small; this form is the one measured on an industrial arm.
+    with $|\tau|_\varepsilon = \sqrt{\tau^2 + \varepsilon^2} - \varepsilon$. The text
+    names the dependence on the load as the fourth part of friction and leaves it out,
+    as small; this form is the one measured on an industrial arm.
 
     Attributes:
         coulomb: $\mu \ge 0$, share of the load [-].
@@ -214,6 +214,4 @@ class LoadFriction(AbstractMesh):
 def _root(x, y):
     """Square root of x^2 + y^2 for y > 0, without overflow."""
     ratio = jnp.clip(x / y, -1e8, 1e8)
-    return jnp.where(
-        jnp.abs(x) < 1e8 * y, y * jnp.sqrt(1.0 + ratio**2), jnp.abs(x)
-    )
+    return jnp.where(jnp.abs(x) < 1e8 * y, y * jnp.sqrt(1.0 + ratio**2), jnp.abs(x))

@@ -4,6 +4,7 @@ from ._evaluate import (
     RecordingReport as RecordingReport,
     evaluate_recording as evaluate_recording,
 )
+from ._law_fit import LawFit as LawFit, fit_law as fit_law
 from ._recording import Recording as Recording, recorded_reference as recorded_reference
 from ._recording_fit import (
     STEEPNESS_GRID as STEEPNESS_GRID,

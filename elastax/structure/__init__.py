@@ -1,5 +1,6 @@
 """Elastic structure: spring laws, bearings and beams."""
 
+from ._axes import AxisStiffness as AxisStiffness
 from ._backlash_stiffness import BacklashStiffness as BacklashStiffness
 from ._beam import (
     HINGE_POSITION as HINGE_POSITION,

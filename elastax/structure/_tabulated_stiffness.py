@@ -12,6 +12,8 @@ from .._custom_types import as_real
 from ._stiffness import AbstractStiffness, invert
 
 
+Points = Float[Array, "points *coordinates"]
+
 _NEWTON_STEPS = 8
 
 
@@ -36,8 +38,8 @@ class TabulatedStiffness(AbstractStiffness):
         [Reiner2010] section 2.3.2 for the spring; interpolation [FritschCarlson1980].
     """
 
-    torsions: Float[Array, "points *coordinates"] = eqx.field(converter=as_real)
-    torques: Float[Array, "points *coordinates"] = eqx.field(converter=as_real)
+    torsions: Points = eqx.field(converter=as_real)
+    torques: Points = eqx.field(converter=as_real)
 
     def __check_init__(self):
         check_fields(self)
@@ -94,7 +96,7 @@ class TabulatedStiffness(AbstractStiffness):
 
 
 def _coefficients(spring):
-    """Left ends, values there and the coefficients of the cubics; the last is a line."""
+    """Left ends, values there, coefficients of the cubics; the last is a line."""
     zero = jnp.zeros_like(spring.torsions[:1])
     x = jnp.concatenate([zero, spring.torsions])
     y = jnp.concatenate([zero, spring.torques])

@@ -6,27 +6,23 @@ import math
 import jax
 import jax.numpy as jnp
 import pytest
+from elastax._kernel import kernel
+from elastax._taylor import compose, from_derivatives
 from elastax.drivetrain import CoulombViscousFriction, TwoScaleFriction
+from hypothesis import given, settings, strategies as st
 
+from tests.drivetrain.friction_laws import (
+    SPEED,
+    coulomb_viscous,
+    each_law,
+    each_law_slowly,
+    each_odd_law,
+    two_scale,
+)
 from tests.helpers import assert_close, assert_gradient, load_vectors
 
 
-laws = [
-    CoulombViscousFriction(
-        jnp.array([12.5, 0.0]), jnp.array([38.0, 5.0]), jnp.array([45.0, 400.0])
-    ),
-    # [Weigand2021], axes 1 and 2 of the KR300; the finer scale of axis 1 only.
-    TwoScaleFriction(
-        jnp.array([2050.35, 2306.7]),
-        jnp.array([285.36, 10.0]),
-        jnp.array([10.0, 100.0]),
-        jnp.array([70.135, 232.33]),
-        jnp.array([530.0, 28994.0]),
-        jnp.array([54.024, -255.55]),
-    ),
-]
-each_law = pytest.mark.parametrize("law", laws, ids=lambda f: type(f).__name__)
-SPEED = jnp.array([3e-3, -8e-5])
+EPS = jnp.finfo(jnp.float64).eps
 
 
 def test_vector():
@@ -62,20 +58,21 @@ def test_referral_keeps_the_power(law):
     assert_close(torque * SPEED, law.torque(ratio * SPEED) * ratio * SPEED, rtol=1e-14)
 
 
-@each_law
-def test_odd_but_for_the_offset_and_dissipative(law):
-    speed = jnp.array([[1e-6, 3e-5], [2e-3, 4e-2], [0.5, 2.0]])
-    torque = jax.vmap(law.torque)
-    rest = law.torque(jnp.zeros(2))
-    offset = law.offset if isinstance(law, TwoScaleFriction) else jnp.zeros(2)
-    assert_close(rest, offset, rtol=0.0)
-    forward, backward = torque(speed) - rest[None], torque(-speed) - rest[None]
-    assert_close(forward, -backward, rtol=1e-12, atol=1e-12)
-    assert jnp.all(forward * speed > 0)
+@each_odd_law
+def test_odd_and_dissipative(law):
+    speed = jnp.array([[0.0, 0.0], [1e-6, 3e-5], [2e-3, 4e-2], [0.5, 2.0]])
+    forward, backward = jax.vmap(law.torque)(speed), jax.vmap(law.torque)(-speed)
+    assert_close(forward, -backward, rtol=1e-15)
+    assert_close(forward[0], jnp.zeros(2), rtol=0.0)
+    assert jnp.all(forward[1:] > 0)
+
+
+def test_the_offset_alone_acts_at_rest():
+    assert_close(two_scale.torque(jnp.zeros(2)), two_scale.offset, rtol=0.0)
 
 
 def test_two_scales_against_the_sum_of_two_laws():
-    law = laws[1]
+    law = two_scale
     coarse = CoulombViscousFriction(law.viscous, law.coulomb, 2.0 * law.steepness)
     fine = CoulombViscousFriction(
         jnp.zeros(2), law.coulomb_fine, 2.0 * law.steepness_fine
@@ -119,12 +116,12 @@ def derivative_of(function, x):
     return jax.jvp(function, (x,), (jnp.ones_like(x),))[1]
 
 
-@each_law
+@each_law_slowly
 def test_gradient(law):
     assert_gradient(lambda f, v: f.torque(v), law, SPEED, order=2)
 
 
-@each_law
+@each_law_slowly
 def test_extremes_are_finite(law):
     speeds = jnp.array([[0.0], [1e-300], [1e8]]) * jnp.array([[1.0, -1.0]])
 
@@ -137,9 +134,80 @@ def test_extremes_are_finite(law):
 
     for leaf in jax.tree.leaves(jax.jit(jax.vmap(everything, (None, 0)))(law, speeds)):
         assert jnp.all(jnp.isfinite(leaf))
-    # Without overflow: far out only the viscous part and the levels are left.
-    level = law.torque(speeds[2]) - law.viscous * speeds[2]
-    assert jnp.all(jnp.abs(level) < 1e-3 * law.viscous * 1e8 + 10.0)
+    # Without overflow: far out only a straight line and the levels are left.
+    one = jnp.ones(2)
+    torque, slope = jax.jvp(law.torque, (speeds[2],), (one,))
+    assert jnp.all(jnp.abs(torque - slope * speeds[2]) < 1e-3 * slope * 1e8 + 10.0)
+
+
+@each_law_slowly
+def test_speed_inverts_torque(law):
+    scale = jnp.array([1e-6, 0.1, 3.0, 40.0, 3e3])[:, None]
+    speed = scale * SPEED[None]
+    torque = jax.vmap(law.torque)(speed)
+    recovered = jax.jit(jax.vmap(law.speed))(torque)
+    assert_close(jax.vmap(law.torque)(recovered), torque, rtol=1e-12)
+    slope = jax.vmap(lambda v: jax.jvp(law.torque, (v,), (jnp.ones(2),))[1])(speed)
+    # Rounding of the torque, through the inverse; nothing but rounding remains.
+    assert jnp.all(jnp.abs(recovered - speed) <= 10 * EPS * jnp.abs(torque) / slope)
+
+
+@each_law_slowly
+def test_speed_gradient(law):
+    # At a moderate speed: where a law is nearly flat, its inverse is all rounding.
+    torque = law.torque(jnp.array([0.02, -1e-3]))
+    assert_gradient(lambda f, t: f.speed(t), law, torque)
+
+
+def test_speed_beyond_the_range_of_a_bounded_law():
+    law = CoulombViscousFriction(0.0, 5.0, 400.0)
+    speed, slope = jax.jvp(law.speed, (jnp.array([6.0, -6.0]),), (jnp.ones(2),))
+    assert jnp.all(jnp.isfinite(speed)) and jnp.all(speed[0] > 1e50 > -1e50 > speed[1])
+    assert_close(slope, jnp.zeros(2), rtol=0.0)
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    steepness=st.floats(0.0, 6.0), place=st.floats(-8.0, 8.0), viscous=st.floats(-6, 3)
+)
+def test_speed_over_decades(steepness, place, viscous):
+    law = CoulombViscousFriction(10.0**viscous, 38.0, 10.0**steepness)
+    speed = jnp.array(10.0**place)
+    torque, slope = jax.jvp(law.torque, (speed,), (jnp.ones(()),))
+    error = jitted_round_trip(law, speed) - speed
+    assert jnp.abs(error) <= 10 * EPS * jnp.maximum(speed, jnp.abs(torque) / slope)
+
+
+@jax.jit
+def jitted_round_trip(law, speed):
+    return law.speed(law.torque(speed))
+
+
+@pytest.mark.slow
+@each_law
+def test_taylor_composition(law):
+    # Speed moves as v + a t: the coefficients are those of the derivatives.
+    rate = jnp.array([0.3, -0.2])
+    for speed in (SPEED, jnp.zeros(2), jnp.full(2, 1e-300), jnp.full(2, -1e8)):
+        series = from_derivatives(jnp.stack([speed, rate, *jnp.zeros((3, 2))]))
+        result = compose(law.torque, series).derivatives()
+        assert jnp.all(jnp.isfinite(result))
+    result = compose(
+        law.torque, from_derivatives(jnp.stack([SPEED, rate, *jnp.zeros((2, 2))]))
+    ).derivatives()
+    function = law.torque
+    for order in range(4):
+        assert_close(result[order], function(SPEED) * rate**order, rtol=1e-11)
+        function = functools.partial(derivative_of, function)
+
+
+@pytest.mark.slow
+@each_law
+def test_in_a_kernel(law):
+    inside = kernel(lambda law, speed: law.torque(speed))
+    assert_close(inside(law, SPEED), law.torque(SPEED), rtol=1e-13)
+    text = jax.jit(inside).lower(law, SPEED).as_text()
+    assert "elastax_" in text
 
 
 @each_law
@@ -167,9 +235,13 @@ def test_scaled(law):
             lambda: CoulombViscousFriction(jnp.ones(2), jnp.ones(3), jnp.ones(2)),
             "must have the shape",
         ),
-        (lambda: laws[0].to_output_side(0.0), "`ratio` must not be zero"),
+        (lambda: coulomb_viscous.to_output_side(0.0), "`ratio` must not be zero"),
         (lambda: TwoScaleFriction(1.0, 1.0, 1.0, -1.0, 1.0, 0.0), "`coulomb_fine`"),
         (lambda: TwoScaleFriction(1.0, 1.0, 1.0, 1.0, 0.0, 0.0), "`steepness_fine`"),
+        (
+            lambda: CoulombViscousFriction(0.0, 0.0, 1.0).speed(jnp.ones(())),
+            "must be monotone",
+        ),
     ],
 )
 def test_refusals(build, message):

@@ -1,69 +1,14 @@
-r"""Friction of motors, gears and bearings as a function of speed.
+"""Viscous and smoothed Coulomb friction, on one and on two scales of speed."""
 
-The laws are smooth, so that an inverse model can differentiate them, and act
-elementwise; their parameters are scalars or hold one value per joint. Friction opposes
-the motion: it is subtracted from the motor torque. The smoothed Coulomb part is a
-level, not stiction, and vanishes at rest.
-"""
-
-import abc
 import dataclasses
 
 import equinox as eqx
-import jax
-import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
-from .._checks import check_fields, check_values
-from .._custom_types import as_real
-
-
-# `jnp.tanh` is differentiated as 1 - tanh^2, which loses its digits as tanh approaches
-# one and is exactly zero from 19 on, together with all further derivatives.
-@jax.custom_jvp
-def _tanh(x):
-    return jnp.tanh(x)
-
-
-@jax.custom_jvp
-def _sech2(x):
-    decay = jnp.exp(-2.0 * jnp.abs(x))
-    return 4.0 * decay / (1.0 + decay) ** 2
-
-
-@_tanh.defjvp
-def _tanh_jvp(primals, tangents):
-    (x,), (change,) = primals, tangents
-    return _tanh(x), _sech2(x) * change
-
-
-@_sech2.defjvp
-def _sech2_jvp(primals, tangents):
-    (x,), (change,) = primals, tangents
-    slope = _sech2(x)
-    return slope, -2.0 * _tanh(x) * slope * change
-
-
-class AbstractFriction(eqx.Module):
-    """Smooth map from speed to the friction torque that opposes it."""
-
-    @abc.abstractmethod
-    def torque(self, speed: Float[Array, "..."]) -> Float[Array, "..."]:
-        """Friction torque [N m] at `speed` [rad/s], both on the same gear side."""
-
-    @abc.abstractmethod
-    def scaled(self, factor: Float[Array, "..."] | float) -> "AbstractFriction":
-        """The same law with its torque multiplied by `factor` > 0."""
-
-    @abc.abstractmethod
-    def to_output_side(self, ratio: Float[Array, "..."] | float) -> "AbstractFriction":
-        """The law on the output side of a gear, of one given on the motor side.
-
-        The power that it takes stays the same: $\\tau(v) = i\\,\\tau_{motor}(i\\,v)$.
-
-        Args:
-            ratio: gear ratio $i$, motor / output; its sign is kept.
-        """
+from ..._checks import check_fields, check_values
+from ..._custom_types import as_real
+from ._base import AbstractFriction, ratio_size
+from ._tanh import tanh
 
 
 class CoulombViscousFriction(AbstractFriction):
@@ -98,7 +43,10 @@ class CoulombViscousFriction(AbstractFriction):
         check_values("`steepness` must be positive", self.steepness, self.steepness > 0)
 
     def torque(self, speed: Float[Array, "..."]) -> Float[Array, "..."]:
-        return self.viscous * speed + self.coulomb * _tanh(0.5 * self.steepness * speed)
+        return self.viscous * speed + self.coulomb * tanh(0.5 * self.steepness * speed)
+
+    def is_monotone(self) -> Bool[Array, "..."]:
+        return self.viscous + self.coulomb > 0
 
     def scaled(self, factor: Float[Array, "..."] | float) -> "CoulombViscousFriction":
         return dataclasses.replace(
@@ -108,7 +56,7 @@ class CoulombViscousFriction(AbstractFriction):
     def to_output_side(
         self, ratio: Float[Array, "..."] | float
     ) -> "CoulombViscousFriction":
-        size = _ratio_size(ratio)
+        size = ratio_size(ratio)
         return dataclasses.replace(
             self,
             viscous=size**2 * self.viscous,
@@ -162,9 +110,12 @@ class TwoScaleFriction(AbstractFriction):
         return (
             self.offset
             + self.viscous * speed
-            + self.coulomb * _tanh(self.steepness * speed)
-            + self.coulomb_fine * _tanh(self.steepness_fine * speed)
+            + self.coulomb * tanh(self.steepness * speed)
+            + self.coulomb_fine * tanh(self.steepness_fine * speed)
         )
+
+    def is_monotone(self) -> Bool[Array, "..."]:
+        return self.viscous + self.coulomb + self.coulomb_fine > 0
 
     def scaled(self, factor: Float[Array, "..."] | float) -> "TwoScaleFriction":
         return dataclasses.replace(
@@ -176,7 +127,7 @@ class TwoScaleFriction(AbstractFriction):
         )
 
     def to_output_side(self, ratio: Float[Array, "..."] | float) -> "TwoScaleFriction":
-        size = _ratio_size(ratio)
+        size = ratio_size(ratio)
         return dataclasses.replace(
             self,
             viscous=size**2 * self.viscous,
@@ -186,10 +137,3 @@ class TwoScaleFriction(AbstractFriction):
             steepness_fine=size * self.steepness_fine,
             offset=as_real(ratio) * self.offset,
         )
-
-
-def _ratio_size(ratio):
-    """Magnitude of the gear ratio: for an odd law its sign makes no difference."""
-    size = jnp.abs(as_real(ratio))
-    check_values("`ratio` must not be zero", size, size != 0)
-    return size
