@@ -3,10 +3,14 @@
 from ..structure import (
     AbstractStiffness as AbstractStiffness,
     AxisStiffness as AxisStiffness,
+    BacklashStiffness as BacklashStiffness,
     CubicStiffness as CubicStiffness,
+    ExponentialStiffness as ExponentialStiffness,
     LimitedStiffness as LimitedStiffness,
     LinearStiffness as LinearStiffness,
+    TabulatedStiffness as TabulatedStiffness,
 )
+from ._backlash import Backlash as Backlash
 from ._branch import (
     AbstractGearBranch as AbstractGearBranch,
     AbstractSwitchingBranch as AbstractSwitchingBranch,
@@ -19,6 +23,11 @@ from ._counterbalance import (
     SpringCounterbalance as SpringCounterbalance,
 )
 from ._drivetrain import DriveTrain as DriveTrain, GearMemory as GearMemory
+from ._efficiency import (
+    AbstractEfficiency as AbstractEfficiency,
+    ConstantEfficiency as ConstantEfficiency,
+    FallingEfficiency as FallingEfficiency,
+)
 from ._friction import (
     AbstractFriction as AbstractFriction,
     AsymmetricFriction as AsymmetricFriction,
@@ -43,7 +52,11 @@ from ._hysteretic_branch import (
     HysteresisBranch as HysteresisBranch,
     StopBranch as StopBranch,
 )
-from ._mesh import AbstractMesh as AbstractMesh
+from ._mesh import (
+    AbstractMesh as AbstractMesh,
+    DirectionalEfficiency as DirectionalEfficiency,
+    LoadFriction as LoadFriction,
+)
 from ._motor import Motor as Motor
 from ._switching_friction import (
     AbstractSwitchingFriction as AbstractSwitchingFriction,

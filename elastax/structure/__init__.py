@@ -1,6 +1,7 @@
 """Elastic structure: spring laws, bearings and beams."""
 
 from ._axes import AxisStiffness as AxisStiffness
+from ._backlash_stiffness import BacklashStiffness as BacklashStiffness
 from ._beam import (
     HINGE_POSITION as HINGE_POSITION,
     TIP_FORCE as TIP_FORCE,
@@ -11,9 +12,11 @@ from ._beam import (
     Material as Material,
     UniformBeam as UniformBeam,
 )
+from ._exponential_stiffness import ExponentialStiffness as ExponentialStiffness
 from ._stiffness import (
     AbstractStiffness as AbstractStiffness,
     CubicStiffness as CubicStiffness,
     LimitedStiffness as LimitedStiffness,
     LinearStiffness as LinearStiffness,
 )
+from ._tabulated_stiffness import TabulatedStiffness as TabulatedStiffness

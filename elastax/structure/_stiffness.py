@@ -54,16 +54,16 @@ class AbstractStiffness(eqx.Module):
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _invert(solve: Callable, spring: AbstractStiffness, torque):
+def invert(solve: Callable, spring: AbstractStiffness, torque):
     """Inverse of `spring.torque` by `solve`, differentiated implicitly."""
     return solve(spring, torque)
 
 
-@_invert.defjvp
+@invert.defjvp
 def _invert_jvp(solve, primals, tangents):
     spring, torque = primals
     spring_change, torque_change = tangents
-    torsion = _invert(solve, spring, torque)
+    torsion = invert(solve, spring, torque)
     _, held = jax.jvp(lambda law: law.torque(torsion), (spring,), (spring_change,))
     return torsion, (torque_change - held) / spring.stiffness(torsion)
 
@@ -138,7 +138,7 @@ class CubicStiffness(AbstractStiffness):
         return self.secant(torsion) * torsion
 
     def torsion(self, torque: Float[Array, "..."]) -> Float[Array, "..."]:
-        return _invert(_solve_cubic, self, torque)
+        return invert(_solve_cubic, self, torque)
 
     def stiffness(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
         return self.linear * (1.0 + 3.0 * self.hardening * torsion**2)
@@ -213,7 +213,7 @@ class LimitedStiffness(AbstractStiffness):
         return torsion * self.secant(torsion)
 
     def torsion(self, torque: Float[Array, "..."]) -> Float[Array, "..."]:
-        return _invert(_solve_limited, self, torque)
+        return invert(_solve_limited, self, torque)
 
     def stiffness(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
         rise = self.linear * self.hardening * torsion**2
