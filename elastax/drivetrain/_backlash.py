@@ -14,8 +14,8 @@ class Backlash(eqx.Module):
 
     With $\delta = \varphi_{rel} - \varphi_0$ the teeth touch where $|\delta| > b/2$.
     There the spring gives $\tau_c = k(\delta \mp b/2)$ and the damper $\tau_d =
-    d\,\dot\varphi_{rel}$, which is limited: it pushes by no more than the spring does, so
-    that the torque starts from zero, and the sum never pulls. The text tests
+    d\,\dot\varphi_{rel}$, which is limited: it pushes by no more than the spring does,
+    so that the torque starts from zero, and the sum never pulls. The text tests
     $\varphi_{rel}$ itself, which makes the torque jump by $k(\varphi_0)$ where the gap
     is not centred, and lets the damper pull. In contact the stiffness belongs to the
     contact's depth and not to the torsion.

@@ -14,7 +14,8 @@ from ._friction import AbstractFriction
 from ._friction._tanh import tanh
 
 
-_NEWTON_STEPS = 12
+_HALVINGS = 32
+_NEWTON_STEPS = 4
 
 
 class AbstractMesh(eqx.Module):
@@ -47,8 +48,10 @@ class DirectionalEfficiency(AbstractMesh):
       \xi = \tfrac1\pi\arctan(s\,\tau_A\omega_A) + \tfrac12$$
 
     with $\tau_B$ the load that is handed on and the frictions $\tau_r(\omega_A)$ of the
-    two directions. $\tau_B$ rises with $\tau_A$, by $\eta_1$ at least, so that the
-    inverse is unique. At standstill half of both directions acts and the teeth keep
+    two directions. As long as the friction of driving is not above that of being
+    driven, $\tau_B$ rises with $\tau_A$, by $\eta_1$ at least, and the inverse is
+    unique; with more friction while driving there would be torques that drive and are
+    driven at once. At standstill half of both directions acts and the teeth keep
     $(2 - \eta_1 - 1/\eta_2)\,\tau_A/2$; with small positive power they even gain some,
     until $\xi/(1 - \xi) > (1/\eta_2 - 1)/(1 - \eta_1)$, which friction hides. Friction
     here is not to be counted again in the motor's.
@@ -112,21 +115,27 @@ class DirectionalEfficiency(AbstractMesh):
 
 @jax.custom_jvp
 def _drive_torque(mesh, load, speed):
-    """Newton's method between the torques of either direction alone."""
+    """The share by halving an interval, then Newton's method for the torque.
+
+    For a given share the torque is a quotient of linear functions of it, which lies
+    between those of either direction alone.
+    """
     driving, driven, friction_1, friction_2 = mesh._ends(speed)
-    one, other = (load + friction_1) / driving, (load + friction_2) * driven
-    low, high = jnp.minimum(one, other), jnp.maximum(one, other)
-    # concave for positive speeds, convex for negative ones: monotone from that side
-    drive = jnp.where(speed > 0, low, high)
+
+    def drive_at(share):
+        held = load + share * friction_1 + (1.0 - share) * friction_2
+        return held / (share * driving + (1.0 - share) / driven)
+
+    share, width = 0.5 * jnp.ones_like(load * speed), 0.25
+    for _ in range(_HALVINGS):
+        more = mesh._share(drive_at(share), speed) > share
+        share, width = share + jnp.where(more, width, -width), 0.5 * width
+    drive = drive_at(share)
     for _ in range(_NEWTON_STEPS):
         value, slope = jax.jvp(
             lambda d: mesh.load_torque(d, speed), (drive,), (jnp.ones_like(drive),)
         )
-        short = value < load
-        low, high = jnp.where(short, drive, low), jnp.where(short, high, drive)
-        step = drive - (value - load) / slope
-        inside = (step >= low) & (step <= high)
-        drive = jnp.where(inside, step, 0.5 * (low + high))
+        drive = drive - (value - load) / slope
     return drive
 
 
@@ -202,7 +211,12 @@ class LoadFriction(AbstractMesh):
         whole = drive + share * self.rounding
         rest = 1.0 - share**2
         root = _root(whole, jnp.sqrt(rest) * self.rounding)
-        return (whole - share * root) / rest
+        # of the two forms of the root of the equation the one that does not cancel
+        alike = share * whole >= 0
+        below = jnp.where(alike, whole + share * root, jnp.ones_like(whole))
+        product = drive * (whole + share * self.rounding)
+        safe = jnp.where(below == 0, jnp.ones_like(below), below)
+        return jnp.where(alike, product / safe, (whole - share * root) / rest)
 
     def _share(self, speed):
         # bounded, so that its square does not overflow

@@ -60,14 +60,14 @@ class BacklashStiffness(AbstractStiffness):
         return invert(_solve, self, torque)
 
     def stiffness(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
-        plus, minus = _lengths(self, torsion)
-        half = 0.5 * self.width
-        slopes = (torsion + half) / plus - (torsion - half) / minus
-        return self.contact * (1.0 - 0.5 * slopes) + self.residual
+        excess, both, root = _gap(self, torsion)
+        rise = self.width * torsion**2 * (excess / root / both**3)
+        return self.secant(torsion) + self.contact * rise
 
     def secant(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
-        plus, minus = _lengths(self, torsion)
-        return self.contact * (1.0 - self.width / (plus + minus)) + self.residual
+        excess, both, _ = _gap(self, torsion)
+        share = excess / (both * (both + self.width))  # 1 - b / (S+ + S-)
+        return self.contact * share + self.residual
 
     def potential(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
         half = 0.5 * self.width
@@ -89,9 +89,14 @@ def _root(spring, u):
     return jnp.where(jnp.abs(ratio) < 1e8, near, jnp.abs(u))
 
 
-def _lengths(spring, torsion):
-    half = 0.5 * spring.width
-    return _root(spring, torsion + half), _root(spring, torsion - half)
+def _gap(spring, torsion):
+    """$(S_+ + S_-)^2 - b^2$ without cancellation, $S_+ + S_-$ and $S_+ S_-$."""
+    half, rounding = 0.5 * spring.width, spring.rounding
+    outside = (jnp.abs(torsion) + half) * (jnp.abs(torsion) - half) + rounding**2
+    product = jnp.sqrt(outside**2 + (2.0 * half * rounding) ** 2)
+    inside = (2.0 * half * rounding) ** 2 / (product + jnp.abs(outside))
+    excess = 2.0 * jnp.where(outside > 0, outside + product, inside)
+    return excess, jnp.sqrt(spring.width**2 + excess), product
 
 
 def _area(spring, u):
