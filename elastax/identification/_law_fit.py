@@ -43,7 +43,11 @@ class LawFit(eqx.Module):
     steps: Int[Array, ""]
 
     def is_identifiable(self) -> Bool[Array, " parameters"]:
-        """Whether the standard error of a parameter is finite and below its value."""
+        """Whether the standard error of a parameter is finite and below its value.
+
+        A parameter that is zero within its error counts as not identifiable: whether
+        the law has that part cannot be said.
+        """
         known = jnp.isfinite(self.deviations)
         return known & (self.deviations < jnp.abs(self.values))
 
@@ -86,7 +90,8 @@ def fit_law(
         outputs: measured, samples along the leading axis.
         held: selects the leaf or leaves of the law that are not fitted, such as
             `lambda law: (law.steepness,)`.
-        signed: selects those that may change their sign, such as an offset.
+        signed: selects those that may change their sign, such as an offset. Entries
+            that are not positive at the start may anyway.
         deviation: standard deviation $\sigma$ of the outputs; estimated from the
             residuals unless given.
         starts: number of starts. The first is the law as given; the others have every

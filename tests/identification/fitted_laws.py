@@ -14,13 +14,26 @@ from elastax.drivetrain import (
     AsymmetricFriction,
     AxisFriction,
     BreakawayFriction,
+    ConstantEfficiency,
     CoulombViscousFriction,
+    DirectionalEfficiency,
+    FallingEfficiency,
+    LoadFriction,
     PiecewiseFriction,
+    SpringCounterbalance,
     StribeckFriction,
     TemperatureFriction,
+    TransmissionError,
     TwoScaleFriction,
 )
-from elastax.structure import CubicStiffness, LimitedStiffness, LinearStiffness
+from elastax.structure import (
+    BacklashStiffness,
+    CubicStiffness,
+    ExponentialStiffness,
+    LimitedStiffness,
+    LinearStiffness,
+    TabulatedStiffness,
+)
 
 
 STEEPNESS = (1.0, 30.0, 1e3, 1e4)
@@ -58,6 +71,32 @@ def torsions(_):
     """Far into the limit of a spring."""
     size = np.geomspace(1e-4, 2e-2, 400)
     return jnp.asarray(np.concatenate([-size[::-1], size]))
+
+
+def load_torque(mesh, sample):
+    """What the teeth hand on."""
+    return mesh.load_torque(*sample)
+
+
+def drive_torque(mesh, sample):
+    """What drives the teeth."""
+    return mesh.drive_torque(*sample)
+
+
+def motor_angle(error, angle):
+    """Angle of the motor over that behind the teeth."""
+    return error.motor_angle(angle)
+
+
+def torques_and_speeds(steepness):
+    """Both directions of the power, at every speed."""
+    torque, speed = np.meshgrid(np.linspace(-50.0, 50.0, 12), speeds(steepness))
+    return jnp.asarray(torque.ravel()), jnp.asarray(speed.ravel())
+
+
+def angles(_):
+    """Three quarters of a turn."""
+    return jnp.linspace(-2.5, 2.2, 400)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -127,5 +166,66 @@ CASES = {
         # the limitation is as sharp as a zero crossing: over a fraction of the limit
         lambda s: LimitedStiffness(2e5, 4e4, 5e5, 100.0 * s / 5e5),
         torsions,
+    ),
+    "exponential spring": Case(
+        lambda s: ExponentialStiffness(2e5, 5e5, 300.0, 1e-4 / s),
+        torsions,
+        lambda law: law.rounding,
+    ),
+    "soft gap": Case(
+        lambda s: BacklashStiffness(2e5, 4e-3, 4e-4 / s, 3e3),
+        torsions,
+        lambda law: law.rounding,
+        starts=8,
+    ),
+    "table": Case(
+        lambda _: TabulatedStiffness(
+            jnp.array([2e-3, 5e-3, 1e-2]), jnp.array([300.0, 900.0, 2500.0])
+        ),
+        torsions,
+        lambda law: law.torsions,
+    ),
+    "efficiency": Case(
+        lambda s: DirectionalEfficiency(
+            ConstantEfficiency(0.9),
+            ConstantEfficiency(0.8),
+            s,
+            CoulombViscousFriction(5.0, 5.0, s),
+        ),
+        inputs=torques_and_speeds,
+        held=lambda law: (law.steepness, law.driving_friction.steepness),
+        function=load_torque,
+    ),
+    "falling efficiency": Case(
+        lambda s: DirectionalEfficiency(
+            FallingEfficiency(0.9, 0.05, 0.6, 40.0, 0.01), ConstantEfficiency(0.8), s
+        ),
+        inputs=torques_and_speeds,
+        held=lambda law: (law.steepness, law.driving.sharpness, law.driving.rounding),
+        function=load_torque,
+    ),
+    "load friction": Case(
+        lambda s: LoadFriction(0.1, 0.05, max(0.2, 3.0 / s), s, 5.0),
+        inputs=torques_and_speeds,
+        held=lambda law: (law.steepness, law.rounding),
+        function=drive_torque,
+    ),
+    "transmission error": Case(
+        lambda _: TransmissionError(
+            jnp.array([[3e-4], [1e-4]]),
+            jnp.array([[1.0], [12.0]]),
+            jnp.array([[0.4], [1.0]]),
+            jnp.array([0.3]),
+        ),
+        lambda _: angles(_)[:, None],
+        held=lambda law: law.orders,
+        function=motor_angle,
+    ),
+    "counterbalance": Case(
+        # torques alone do not tell the size of the linkage, nor the reference length
+        # from the preload
+        lambda _: SpringCounterbalance(0.72, 0.19, 0.35, 9e4, 0.53, 1.1e4, 1e3),
+        angles,
+        held=lambda law: (law.base_distance, law.reference_length, law.damping),
     ),
 }

@@ -162,6 +162,17 @@ def test_parameters_that_act_only_jointly_are_unidentifiable():
 
 
 @pytest.mark.slow
+def test_torques_do_not_tell_the_size_of_a_linkage():
+    case = CASES["counterbalance"]
+    law, angle = case.build(1.0), case.inputs(1.0)
+    held = lambda law: (law.reference_length, law.damping)
+    fit = fit_law(law, torque, angle, law.torque(angle), held=held)
+    jointly = ("base_distance", "lever", "spring_rate", "preload")
+    assert fit.unidentifiable() == jointly
+    assert fit.names == (*jointly[:2], "angle_offset", *jointly[2:])
+
+
+@pytest.mark.slow
 def test_signed_parameters_may_change_their_sign():
     law = TwoScaleFriction(2050.0, 285.0, 10.0, 70.0, 530.0, -54.0)
     speed = speeds(10.0)
