@@ -39,3 +39,32 @@ def test_figure_2_3(tmp_path, capsys):
     assert ours["least slope of the cubic"] > 0.2
     for place in ("the step speed", "1 rad/s"):
         assert ours[f"jump of the slope at {place}"] < 1e-9
+
+
+def test_clutch_and_brake_of_modelica(data_dir):
+    """Continuous signals over their range, switching times in seconds."""
+    figures = load("modelica/rotational_friction.py").main(data=data_dir)
+    assert figures.pop("switching times") < 2e-4
+    assert len(figures) == 6 and max(figures.values()) < 1e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["lossy_gear", "backlash", "elastic_bearing"])
+def test_drive_trains_of_modelica(name, data_dir, tmp_path):
+    figures = load(f"modelica/{name}.py").main(tmp_path, data_dir)
+    for what, value in figures.items():
+        assert value < (2e-4 if "switching" in what else 1e-3), what
+    assert list(tmp_path.glob("*.png"))
+
+
+@pytest.mark.slow
+def test_manutec_r3_of_modelica(data_dir, tmp_path):
+    """Angles within 1e-3 rad, wind-up and currents of elastic axes within 1 %."""
+    figures = load("modelica/robot_r3.py").main(tmp_path, data_dir)
+    for k in range(1, 7):
+        assert figures[f"mechanics.r{k}.phi"] < 1e-3
+    for k in range(1, 4):
+        assert figures[f"axis{k}.gear.spring.phi_rel"] < 1e-2
+        assert figures[f"axis{k}.motor.La.i"] < 1e-2
+    assert figures["modes agree"] > 0.99
+    assert (tmp_path / "robot_r3.png").exists()

@@ -1,5 +1,6 @@
 """Controllers at the motors, and runs of a feed-forward on the elastic plant."""
 
+from ._analogue import AnalogueCascade as AnalogueCascade
 from ._comparison import (
     Run as Run,
     rigid_tool_path as rigid_tool_path,

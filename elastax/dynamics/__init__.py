@@ -27,6 +27,7 @@ from ._energy import (
 from ._equilibrium import (
     holding_torque as holding_torque,
     static_equilibrium as static_equilibrium,
+    static_load as static_load,
 )
 from ._lagrange import lagrange_forces as lagrange_forces
 from ._linearised import body_accelerations as body_accelerations
@@ -61,4 +62,5 @@ from ._switching import (
     SwitchingResult as SwitchingResult,
     simulate_switching as simulate_switching,
 )
+from ._switching_loop import SwitchingLoop as SwitchingLoop
 from ._tool_state import tool_state as tool_state

@@ -5,7 +5,12 @@ from ._iiwa14 import iiwa14 as iiwa14
 from ._kr16 import kr16 as kr16
 from ._kr210 import kr210 as kr210
 from ._kr300 import kr300 as kr300
-from ._manutec_r3 import manutec_r3 as manutec_r3
+from ._manutec_r3 import (
+    manutec_r3 as manutec_r3,
+    manutec_r3_control as manutec_r3_control,
+    manutec_r3_friction as manutec_r3_friction,
+    manutec_r3_plant as manutec_r3_plant,
+)
 from ._named import (
     ARMS as ARMS,
     ROBOTS as ROBOTS,

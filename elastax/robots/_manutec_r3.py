@@ -2,7 +2,14 @@
 
 import numpy as np
 
-from ..drivetrain import CoulombViscousFriction, DriveTrain, LinearStiffness, Motor
+from ..control import AnalogueCascade
+from ..drivetrain import (
+    CoulombViscousFriction,
+    DriveTrain,
+    LinearStiffness,
+    Motor,
+    StickSlipFriction,
+)
 from ..dynamics import (
     Axis,
     Body,
@@ -28,6 +35,11 @@ COULOMB = np.array([0.4, 0.5, 0.7, 21.8, 30.1, 10.9])  # Rv0 [N m]
 VISCOUS = np.array(
     [0.13 / 160, 0.1 / 130, 0.2 / 130, 9.8, 0.03, 3.92]
 )  # Rv1 [N m s/rad]
+PEAK = np.array([1.0, 1.0, 1.0, 26.7 / 21.8, 39.6 / 30.1, 16.8 / 10.9])  # static [-]
+# motors and their current loops
+TORQUE_CONSTANT = np.array([1.1616, 1.1616, 1.1616, 0.2365, 0.2608, 0.0842])  # N m/A
+CURRENT_FREQUENCY = np.array([4590.0, 5500.0, 5500.0, 6250.0, 6250.0, 7400.0])  # 1/s
+CURRENT_DAMPING = np.array([0.6, 0.6, 0.6, 0.55, 0.55, 0.27])  # ratio [-]
 STEEPNESS = 500.0  # assumed, at the output [s/rad]
 
 # assumed for the gears of axes 4 to 6, which are rigid in the source: the motor against
@@ -124,6 +136,49 @@ def manutec_r3() -> ElasticRobot:
     return robot.with_payload(15.0, load, POINT_INERTIA * np.eye(3))
 
 
+def manutec_r3_friction() -> StickSlipFriction:
+    """Exact bearing friction of the Manutec r3 on the output side, for its plant.
+
+    All of it acts at the motors: behind the gears of axes 4 to 6, which are rigid in
+    the source, that is the same.
+
+    References:
+        Modelica Standard Library 4.1.0, RobotR3: GearType1, GearType2, FullRobot.
+    """
+    on_motor = np.arange(6) < 3
+    size = np.where(on_motor, np.abs(RATIO), 1.0)
+    return StickSlipFriction(size**2 * VISCOUS, size * COULOMB, PEAK)
+
+
+def manutec_r3_plant() -> ElasticRobot:
+    """The Manutec r3 with exact bearing friction, as a reference plant."""
+    none = CoulombViscousFriction(np.zeros(6), np.zeros(6), np.ones(6))
+    return manutec_r3().with_drives(
+        motor_friction=manutec_r3_friction(), joint_friction=none
+    )
+
+
+def manutec_r3_control() -> AnalogueCascade:
+    """Controllers and motor electronics of the Manutec r3.
+
+    References:
+        Modelica Standard Library 4.1.0, RobotR3.Utilities: Motor, Controller;
+        parameters of FullRobot.
+    """
+    resistance, input_resistance = 250.0, 10.0  # ohm
+    return AnalogueCascade(
+        ratio=RATIO,
+        position_gain=np.full(6, 5.0),
+        speed_gain=np.full(6, 0.5),
+        reset_time=np.full(6, 0.05),
+        torque_constant=TORQUE_CONSTANT,
+        resistance=resistance,
+        inductance=resistance / (2 * CURRENT_DAMPING * CURRENT_FREQUENCY),
+        integration=input_resistance * 0.004 * CURRENT_DAMPING / CURRENT_FREQUENCY,
+        amplification=1 + 200.0 / 50.0,
+    )
+
+
 def _drives() -> DriveTrain:
     inertia = RATIO[3:] ** 2 * MOTOR_INERTIA[3:]
     omega = 2 * np.pi * RIGID_FREQUENCY
@@ -133,7 +188,7 @@ def _drives() -> DriveTrain:
     steepness = np.full(6, STEEPNESS)
     return DriveTrain(
         ratio=RATIO,
-        motor=Motor(MOTOR_INERTIA),
+        motor=Motor(MOTOR_INERTIA, TORQUE_CONSTANT),
         stiffness=LinearStiffness(
             np.concatenate([RATIO[:3] ** 2 * SPRING, omega**2 * inertia])
         ),
