@@ -3,7 +3,10 @@
 import importlib.util
 import pathlib
 
+import numpy as np
 import pytest
+import scipy.integrate
+import scipy.optimize
 
 
 PAPERS = pathlib.Path(__file__).parents[1] / "papers"
@@ -39,6 +42,47 @@ def test_figure_2_3(tmp_path, capsys):
     assert ours["least slope of the cubic"] > 0.2
     for place in ("the step speed", "1 rad/s"):
         assert ours[f"jump of the slope at {place}"] < 1e-9
+
+
+@pytest.mark.slow
+def test_figure_2_4(tmp_path, capsys):
+    script = load("Reiner2010/figure_2_4.py")
+    ours = script.main(tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").stat().st_size > 10_000
+    assert "closed form" in capsys.readouterr().out
+    # Rounding of powers of 80 W, and the solver's 1e-10 of 1000 J.
+    assert ours["balance of power [W]"] < 1e-12
+    assert ours["balance of energy [J]"] < 5e-7
+    # The arc tangent leaves 1/(pi s P) = 4e-5 of the other direction.
+    speed = ours["speed after 6 s of 30 N m [rad/s]"]
+    assert abs(speed - script.STEADY) < 2e-4
+    assert 0.01 < ours["share of it driven"] < 0.1
+    assert ours["energy lost by efficiency [J]"] > 300
+    assert ours["greatest gain [W]"] < 1e-6
+
+    # (2.11) as printed, without JAX, floor and rounding (1e-5 of the efficiencies)
+    xi = lambda torque, w: np.arctan(script.STEEPNESS * torque * w) / np.pi + 0.5
+
+    def handed_on(torque, w):
+        eta1, eta2 = 0.9 - 0.1 * abs(w), 0.8 - 0.1 * abs(w)
+        friction = 5 * w + 5 * np.tanh(script.STEEPNESS * w / 2)
+        lost = xi(torque, w) * ((1 - eta1) * torque + friction)
+        lost += (1 - xi(torque, w)) * ((1 - 1 / eta2) * torque + friction)
+        return torque - lost
+
+    def field(t, x):
+        torque, w = np.interp(t, script.CORNERS, script.LEVELS), x[0]
+        balance = lambda a: 5 * a - handed_on(torque - a, w)
+        a = scipy.optimize.brentq(balance, -100, 100, xtol=1e-13)
+        lost = (torque - a - handed_on(torque - a, w)) * w
+        return [a, torque * w, lost]
+
+    x = [0.0, 0.0, 0.0]
+    for span in zip(script.CORNERS, script.CORNERS[1:]):
+        whole = scipy.integrate.solve_ivp(field, span, x, "LSODA", rtol=1e-7, atol=1e-9)
+        x = whole.y[:, -1]
+    assert abs(ours["energy put in [J]"] - x[1]) < 1e-4 * x[1]
+    assert abs(ours["energy lost [J]"] - x[2]) < 1e-4 * x[2]
 
 
 def test_clutch_and_brake_of_modelica(data_dir):
