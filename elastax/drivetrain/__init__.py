@@ -22,6 +22,7 @@ from ._counterbalance import (
     GasCounterbalance as GasCounterbalance,
     SpringCounterbalance as SpringCounterbalance,
 )
+from ._cylinder_body import CylinderBody as CylinderBody
 from ._drivetrain import DriveTrain as DriveTrain, GearMemory as GearMemory
 from ._efficiency import (
     AbstractEfficiency as AbstractEfficiency,

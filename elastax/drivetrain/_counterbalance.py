@@ -10,9 +10,9 @@ $$L = \sqrt{a^2 + b^2 - 2ab\cos\psi} = \sqrt{(a - b)^2 + 4ab\sin^2(\psi/2)}.$$
 Signs: `force` is a pull, positive where the cylinder draws its ends together; `torque`
 is what the counterbalance exerts on the joint in the direction of `angle`,
 $\tau = -\mathrm dV/\mathrm d\varphi = -F\,\mathrm dL/\mathrm d\varphi$: a pull drives
-back to the dead point. The mass of the cylinder is left out, and so is its torque about
-other axes where it is mounted beside the plane of motion. The text describes the
-device, but gives no equation.
+back to the dead point. The mass of the cylinder and its place beside the plane of
+motion are options, see `CylinderBody`. The text describes the device, but gives no
+equation.
 """
 
 import abc
@@ -24,6 +24,7 @@ from jaxtyping import Array, Float
 
 from .._checks import check_fields, check_values, is_concrete
 from .._custom_types import Scalar, as_real
+from ._cylinder_body import CylinderBody
 
 
 class AbstractCounterbalance(eqx.Module):
@@ -52,6 +53,49 @@ class AbstractCounterbalance(eqx.Module):
             speed: joint speed [rad/s].
         """
 
+    @abc.abstractmethod
+    def inertia(self, angle: Float[Array, "..."]) -> Float[Array, "..."]:
+        r"""Inertia [kg m^2] of the cylinder's mass about the axis, carrier at rest.
+
+        $J(\varphi) = m\,|\mathrm d r/\mathrm d\varphi|^2$. The joint needs the torque
+        $J\ddot\varphi + \tfrac12 J'(\varphi)\dot\varphi^2$ for it: Lagrange's term
+        $-\tfrac12 J'\dot\varphi^2$ acts on the joint. A mass at a fixed share of the
+        way runs on a circle of the radius $\lambda a$ about a point of the carrier, so
+        that $J = m\lambda^2 a^2$ is the same at every angle and the term vanishes.
+
+        Dynamics and energy of a robot do not count the cylinder's mass.
+        """
+
+    @abc.abstractmethod
+    def gravity_torque(
+        self, angle: Float[Array, "..."], down: Float[Array, "2"]
+    ) -> Float[Array, "..."]:
+        r"""Torque [N m] of the cylinder's weight on the joint.
+
+        $\tau = m\,g\cdot\mathrm dr/\mathrm d\varphi$, in the direction of `angle`.
+
+        Args:
+            angle: joint angle [rad].
+            down: $g$ in the plane of motion [m/s^2], in the frame of the carrier: x
+                from the axis to the carrier's hinge, y a quarter turn on in the
+                direction of `angle`.
+        """
+
+    @abc.abstractmethod
+    def lateral_moment(self, angle: Float[Array, "..."]) -> Float[Array, "..."]:
+        r"""Moment [N m] orthogonal to the axis that the pull puts on the rocker, $F e$.
+
+        The pull acts along $u$, from the rocker's hinge to the carrier's, beside the
+        plane of motion at $e\,n$ with the axis of rotation $n$. Its moment about the
+        point of the axis in the plane is $F e\,(n \times u)$ besides `torque`, with
+
+        $$n \times u = \frac1L \begin{pmatrix} a\sin\psi \\ b - a\cos\psi
+          \end{pmatrix}$$
+
+        in the frame of `gravity_torque`: orthogonal to the cylinder. The carrier is
+        under the opposite moment.
+        """
+
 
 class SpringCounterbalance(AbstractCounterbalance):
     r"""Preloaded spring, $F = F_0 + c\,(L - L_0)$.
@@ -65,6 +109,7 @@ class SpringCounterbalance(AbstractCounterbalance):
         reference_length: $L_0 > 0$, the length at which the preload holds [m].
         preload: $F_0$ [N].
         damping: viscous damping of the rod, not negative [N s/m].
+        body: mass of the cylinder and its lateral offset, or `None` for none of both.
 
     Raises:
         ValueError: a parameter is outside its range, or `lever` equals
@@ -81,6 +126,7 @@ class SpringCounterbalance(AbstractCounterbalance):
     reference_length: Scalar = eqx.field(converter=as_real)
     preload: Scalar = eqx.field(converter=as_real)
     damping: Scalar = eqx.field(converter=as_real, default=0.0)
+    body: CylinderBody | None = None
 
     def __check_init__(self):
         check_fields(self)
@@ -109,6 +155,17 @@ class SpringCounterbalance(AbstractCounterbalance):
     ) -> Float[Array, "..."]:
         return -self.damping * _arm(self, angle) ** 2 * speed
 
+    def inertia(self, angle: Float[Array, "..."]) -> Float[Array, "..."]:
+        return _inertia(self, angle)
+
+    def gravity_torque(
+        self, angle: Float[Array, "..."], down: Float[Array, "2"]
+    ) -> Float[Array, "..."]:
+        return _gravity_torque(self, angle, down)
+
+    def lateral_moment(self, angle: Float[Array, "..."]) -> Float[Array, "..."]:
+        return _lateral_moment(self, angle)
+
 
 class GasCounterbalance(AbstractCounterbalance):
     r"""Hydraulic cylinder that compresses the gas of a bladder accumulator.
@@ -133,6 +190,7 @@ class GasCounterbalance(AbstractCounterbalance):
         piston_diameter: $D_p$ [m].
         rod_diameter: $D_r < D_p$ [m].
         damping: viscous damping of the rod, not negative [N s/m].
+        body: mass of the cylinder and its lateral offset, or `None` for none of both.
 
     Raises:
         ValueError: a parameter is outside its range, `lever` equals `base_distance`,
@@ -151,6 +209,7 @@ class GasCounterbalance(AbstractCounterbalance):
     piston_diameter: Scalar = eqx.field(converter=as_real)
     rod_diameter: Scalar = eqx.field(converter=as_real)
     damping: Scalar = eqx.field(converter=as_real, default=0.0)
+    body: CylinderBody | None = None
 
     def __check_init__(self):
         check_fields(self)
@@ -232,6 +291,17 @@ class GasCounterbalance(AbstractCounterbalance):
     ) -> Float[Array, "..."]:
         return -self.damping * _arm(self, angle) ** 2 * speed
 
+    def inertia(self, angle: Float[Array, "..."]) -> Float[Array, "..."]:
+        return _inertia(self, angle)
+
+    def gravity_torque(
+        self, angle: Float[Array, "..."], down: Float[Array, "2"]
+    ) -> Float[Array, "..."]:
+        return _gravity_torque(self, angle, down)
+
+    def lateral_moment(self, angle: Float[Array, "..."]) -> Float[Array, "..."]:
+        return _lateral_moment(self, angle)
+
 
 def _check_geometry(cylinder) -> None:
     for name in ("base_distance", "lever", "reference_length"):
@@ -268,3 +338,24 @@ def _compression(cylinder, angle):
     """Share of the gas volume that the oil has taken."""
     stroke = _length(cylinder, angle) - cylinder.reference_length
     return stroke * cylinder.area() / cylinder.volume
+
+
+def _inertia(cylinder, angle):
+    if cylinder.body is None:
+        return jnp.zeros_like(angle)
+    radius = cylinder.body.mass_position * cylinder.lever
+    return cylinder.body.mass * radius**2 * jnp.ones_like(angle)
+
+
+def _gravity_torque(cylinder, angle, down):
+    if cylinder.body is None:
+        return jnp.zeros_like(angle)
+    psi = angle + cylinder.angle_offset
+    along = down[1] * jnp.cos(psi) - down[0] * jnp.sin(psi)
+    return cylinder.body.mass * cylinder.body.mass_position * cylinder.lever * along
+
+
+def _lateral_moment(cylinder, angle):
+    if cylinder.body is None:
+        return jnp.zeros_like(angle)
+    return cylinder.force(angle) * cylinder.body.lateral_offset
