@@ -110,8 +110,8 @@ class RelaxationBranch(AbstractGearBranch):
 
     Parallel to the spring $c_1$ of the gear stands the soft spring $c_2$, in series
     with the parallel pair of the spring $c_3$ and a damper. Slow motion meets $c_1$ and
-    the series of $c_2$ and $c_3$, fast motion $c_1 + c_2$; in between energy is lost. The
-    stored energy is that of $c_2$ and $c_3$, the loss $d_z \dot z^2 \ge 0$.
+    the series of $c_2$ and $c_3$, fast motion $c_1 + c_2$; in between energy is lost.
+    The stored energy is that of $c_2$ and $c_3$, the loss $d_z \dot z^2 \ge 0$.
 
     The text describes the elements of its figure 2.5b, but not how they are connected;
     this arrangement is the one that its words suggest, without proof. The damper of the

@@ -4,6 +4,11 @@ from ._evaluate import (
     RecordingReport as RecordingReport,
     evaluate_recording as evaluate_recording,
 )
+from ._hysteresis_fit import (
+    HysteresisFit as HysteresisFit,
+    fit_hysteresis as fit_hysteresis,
+    suggest_thresholds as suggest_thresholds,
+)
 from ._recording import Recording as Recording, recorded_reference as recorded_reference
 from ._recording_fit import (
     STEEPNESS_GRID as STEEPNESS_GRID,

@@ -118,6 +118,21 @@ def test_laws_are_odd_and_the_tangent_is_the_derivative(spring):
 
 
 @each_spring
+def test_secant_is_torque_over_torsion_and_the_tangent_at_zero(spring):
+    torsion = jnp.array([1e-12, 1e-3, 0.3, 1.0, 3.0, 1e3])[:, None] * TORSION[None]
+    expected = jax.vmap(spring.torque)(torsion) / torsion
+    assert_close(jax.vmap(spring.secant)(torsion), expected, rtol=1e-15)
+    assert_close(spring.secant(-TORSION), spring.secant(TORSION), rtol=0.0)
+    zero = jnp.zeros(2)
+    assert_close(spring.secant(zero), spring.stiffness(zero), rtol=1e-15)
+    # even: no slope, and the torque's third derivative is three times the curvature
+    slope = lambda x: derivative(spring.secant, x)
+    third = derivative(lambda x: derivative(spring.stiffness, x), zero)
+    assert_close(slope(zero), zero, rtol=0.0)
+    assert_close(3.0 * derivative(slope, zero), third, rtol=1e-12)
+
+
+@each_spring
 def test_potential_is_the_integral_of_the_torque(spring):
     for index, one in enumerate((0, 1)):
         single = jax.tree.map(lambda leaf: leaf[one], spring)
@@ -201,7 +216,7 @@ def test_extremes_are_finite(spring):
 
     def everything(spring, argument):
         results = []
-        for name in ("torque", "torsion", "potential", "stiffness"):
+        for name in ("torque", "torsion", "potential", "stiffness", "secant"):
             law = lambda s, x, name=name: jnp.sum(getattr(s, name)(x))
             slope = jax.grad(law, argnums=1)
             ones = jnp.ones_like(argument)
