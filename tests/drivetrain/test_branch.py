@@ -136,6 +136,7 @@ def test_jit_vmap_and_loop_agree():
     assert_close(jax.jit(jax.vmap(rates))(torsion), loop, rtol=1e-12, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_gauss_newton_recovers_the_springs_from_half_of_them():
     true = branch(relaxed[0])
     x = jnp.linspace(-1.0, 1.0, 40)[:, None] * jnp.array([[5e-3, 2e-3]])

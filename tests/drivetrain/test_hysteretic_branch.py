@@ -9,6 +9,7 @@ import pytest
 from elastax.drivetrain import (
     CubicStiffness,
     DelayedPlay,
+    ExactHysteresisBranch,
     ExactStopBranch,
     HysteresisBranch,
     LinearStiffness,
@@ -42,6 +43,12 @@ def modulated(play=PLAYS[0]):
 
 def exact():
     return ExactStopBranch(stops().stiffness, THRESHOLDS)
+
+
+def exact_modulated():
+    return ExactHysteresisBranch(
+        modulated().input_weight, modulated().weights, THRESHOLDS
+    )
 
 
 branches = pytest.mark.parametrize(
@@ -175,6 +182,47 @@ def test_exact_memory():
     assert_close(scaled, 0.7 * direct, rtol=1e-14)
 
 
+def test_exact_modulated_branch_is_the_vector_with_the_other_sign():
+    (vector,) = load_vectors("2.19")
+    inputs = vector["inputs"]
+    operator = PrandtlIshlinskii([1.2, -0.1, -0.1], inputs["r_h"], inputs["y0"])
+    spring = CubicStiffness([inputs["c0"]], [inputs["gamma"]])
+    torsion = jnp.array(inputs["phi_rel"])[:, None]
+    column = np.array(inputs["r_h"])[1:, None]
+    part = ExactHysteresisBranch([1.2], [[-0.1], [-0.1]], column)
+
+    def step(memory, x):
+        torque = spring.torque(x) + part.torque(spring, x, memory)
+        return part.memory_after(x, memory), torque
+
+    _, torque = jax.lax.scan(step, part.rest(torsion[0]), torsion)
+    # 2 x - H with the weights (0.8, 0.1, 0.1) of the vector
+    printed = jnp.array(vector["outputs"]["tau"]) - inputs["d"] * jnp.array(
+        inputs["dphi_rel"]
+    )
+    mirrored = 2.0 * spring.torque(torsion)[:, 0] - printed
+    assert_close(torque[:, 0], mirrored, rtol=vector["tol"], atol=1e-10)
+    whole = operator.apply(torsion[:, 0]) * spring.secant(torsion)[:, 0]
+    assert_close(torque[:, 0], whole, rtol=1e-13, atol=1e-12)
+    assert part.scaled(0.5) is part and part.states == 2
+
+
+def test_modulated_branches_agree_within_their_bound():
+    torsion, torque = run(modulated())
+    part = exact_modulated()
+
+    def step(memory, x):
+        return part.memory_after(x, memory), part.torque(SPRING, x, memory)
+
+    _, expected = jax.lax.scan(step, part.rest(torsion[0]), torsion)
+    # ln 2 / psi at the corner of every play, times its weight and the stiffness there
+    stiffness = jnp.max(jax.vmap(SPRING.secant)(torsion), axis=0)
+    corner = math.log(2.0) / PLAYS[0].sharpness
+    bound = -jnp.sum(part.weights, axis=0) * stiffness * corner
+    error = jnp.max(jnp.abs(torque - expected), axis=0)
+    assert jnp.all(error < 1.001 * bound) and jnp.all(error > 0.2 * bound)
+
+
 @each_play
 def test_modulated_branch_is_the_text_less_the_spring(play):
     branch = modulated(play)
@@ -291,6 +339,16 @@ def test_gauss_newton_recovers_stiffness_and_thresholds_from_half_of_them():
             "must be positive",
         ),
         (lambda: ExactStopBranch(jnp.ones((3, 2)), THRESHOLDS), "must have the shape"),
+        (
+            lambda: ExactHysteresisBranch(jnp.ones(2), jnp.ones((2, 2)), THRESHOLDS),
+            "would deliver energy",
+        ),
+        (
+            lambda: ExactHysteresisBranch(
+                jnp.ones(2), jnp.zeros((2, 2)), 0.0 * THRESHOLDS
+            ),
+            "`thresholds` must be positive",
+        ),
         (
             lambda: HysteresisBranch(jnp.zeros(2), -jnp.ones((2, 2)), PLAYS[0]),
             "`input_weight` must be positive",

@@ -63,6 +63,7 @@ def test_memory_is_lost_to_a_biased_rest():
         assert_close(ratio, per_delay, rtol=0.05)  # of one delay, which is not small
 
 
+@pytest.mark.slow
 def test_bias_on_a_ramp_grows_with_a_shorter_delay():
     (vector,) = load_vectors("2.13+2.17 ramp bias")
     for row, bias in zip(
@@ -78,6 +79,7 @@ def test_bias_on_a_ramp_grows_with_a_shorter_delay():
         assert_close(y - (x[-1] - 0.4), [bias], rtol=1e-7)
 
 
+@pytest.mark.slow
 def test_a_sudden_turn_costs_a_quarter_of_the_way_of_a_delay():
     # The delay holds the last y and the first x + r of the turn: a triangle of the
     # height v T / 2, which it levels out. All else is sharp: psi v T = 80.
@@ -97,6 +99,7 @@ def test_gradient():
     assert_gradient(function, plays(), X, STATES, order=2)
 
 
+@pytest.mark.slow
 def test_extremes_are_finite():
     def everything(play, x, xd, states):
         law = lambda p, x, s: jnp.sum(p.outputs(x, s)) + jnp.sum(p.rates(x, xd, s))
@@ -113,7 +116,7 @@ def test_extremes_are_finite():
 
 def test_jit_vmap_and_loop_agree():
     x = X[None] * jnp.linspace(-2.0, 3.0, 4)[:, None]
-    rates = lambda x: plays().rates(x, XD, STATES)
+    rates = jax.jit(lambda x: plays().rates(x, XD, STATES))
     loop = jnp.stack([rates(one) for one in x])
     # rates are differences of values times 60 / delay
     assert_close(jax.jit(jax.vmap(rates))(x), loop, rtol=1e-12, atol=1e-11)
@@ -122,8 +125,8 @@ def test_jit_vmap_and_loop_agree():
 def test_plays_do_not_mix():
     both = plays()
     second = DelayedPlay(both.thresholds[1:], both.sharpness, both.delay)
-    rates = both.rates(X, XD, STATES)
-    assert_close(second.rates(X, XD, STATES[3:]), rates[3:], rtol=1e-14)
+    rates = jax.jit(lambda p, s: p.rates(X, XD, s))
+    assert_close(rates(second, STATES[3:]), rates(both, STATES)[3:], rtol=1e-14)
     assert (both.number, both.states) == (2, 6)
 
 

@@ -31,7 +31,11 @@ STATES = jnp.array([[0.25, 0.05], [0.1, 0.08]])
 
 def exact(x, y0):
     """Exact play along a sequence of inputs."""
-    step = lambda y, x: (play(x, y, jnp.array(R)),) * 2
+
+    def step(y, x):
+        y = play(x, y, jnp.array(R))
+        return y, y
+
     return jax.lax.scan(step, jnp.asarray(y0), x)[1]
 
 
@@ -63,6 +67,7 @@ def test_output_depends_on_the_path_and_not_on_the_speed():
     assert jnp.max(jnp.abs(slow - fast)) < 13 * V0**2 / (2.0 * 3.0)
 
 
+@pytest.mark.slow
 def test_a_reversal_moves_it_by_less_than_its_bound():
     # Much slower: the same parabola at two values of v0, of which one is far below.
     for acceleration, v0 in ((1.0, 0.1), (4.0, 0.1), (1.0, 0.03)):
