@@ -198,8 +198,8 @@ class ExactHysteresisBranch(AbstractSwitchingBranch):
             positive, or shapes differ.
 
     References:
-        [Reiner2010] (2.13), (2.14), (2.19), with the sign condition of a gear that loses
-        energy.
+        [Reiner2010] (2.13), (2.14), (2.19), with the sign condition of a gear that
+        loses energy.
     """
 
     input_weight: PerJoint = eqx.field(converter=as_real)

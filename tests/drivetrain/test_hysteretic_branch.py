@@ -200,9 +200,9 @@ def test_exact_modulated_branch_is_the_vector_with_the_other_sign():
     printed = jnp.array(vector["outputs"]["tau"]) - inputs["d"] * jnp.array(
         inputs["dphi_rel"]
     )
-    mirrored = 2.0 * spring.torque(torsion)[:, 0] - printed
+    mirrored = 2.0 * jax.vmap(spring.torque)(torsion)[:, 0] - printed
     assert_close(torque[:, 0], mirrored, rtol=vector["tol"], atol=1e-10)
-    whole = operator.apply(torsion[:, 0]) * spring.secant(torsion)[:, 0]
+    whole = operator.apply(torsion[:, 0]) * jax.vmap(spring.secant)(torsion)[:, 0]
     assert_close(torque[:, 0], whole, rtol=1e-13, atol=1e-12)
     assert part.scaled(0.5) is part and part.states == 2
 
