@@ -45,6 +45,7 @@ KINDS: dict[str, dict[str, type]] = {
         "relaxation": drivetrain.RelaxationBranch,
         "stops": drivetrain.StopBranch,
         "hysteresis": drivetrain.HysteresisBranch,
+        "exact_hysteresis": drivetrain.ExactHysteresisBranch,
         "exact_stops": drivetrain.ExactStopBranch,
     },
 }
