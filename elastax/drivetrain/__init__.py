@@ -49,6 +49,7 @@ from ._hysteresis import (
     play as play,
 )
 from ._hysteretic_branch import (
+    ExactHysteresisBranch as ExactHysteresisBranch,
     ExactStopBranch as ExactStopBranch,
     HysteresisBranch as HysteresisBranch,
     StopBranch as StopBranch,

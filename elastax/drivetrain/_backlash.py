@@ -63,6 +63,19 @@ class Backlash(eqx.Module):
         pushing = jnp.maximum(spring + jnp.minimum(spring, damper), 0.0)
         return side * pushing
 
+    def resting_torque(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
+        r"""Torque [N m] at rest, strictly increasing, to find a state of rest by.
+
+        Up to $|\delta| = \tfrac34 b$ a straight line of a third of the contact's
+        stiffness stands in for the gap, as in the source of this law: a robot starts in
+        contact where its load is large enough, and else somewhere in the gap.
+        """
+        delta, end = torsion - self.centre, 0.25 * self.width
+        line = self.contact.torque(end) / (0.75 * self.width + (self.width == 0))
+        inside = jnp.abs(delta) < 0.75 * self.width
+        contact = self.contact.torque(self._depth(torsion))
+        return jnp.where(inside, line * delta, contact)
+
     def potential(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
         """Energy [J] in the teeth in contact."""
         return self.contact.potential(self._depth(torsion))

@@ -12,6 +12,7 @@ from .._checks import check_fields, check_values
 from .._custom_types import PerJoint, as_real
 from .._taylor import compose
 from ..structure import AbstractStiffness
+from ._backlash import Backlash
 from ._branch import AbstractGearBranch, AbstractSwitchingBranch
 from ._friction import AbstractFriction
 from ._mesh import AbstractMesh
@@ -62,7 +63,7 @@ class DriveTrain(eqx.Module):
 
     ratio: PerJoint = eqx.field(converter=as_real)
     motor: Motor
-    stiffness: AbstractStiffness | None
+    stiffness: AbstractStiffness | Backlash | None
     damping: PerJoint = eqx.field(converter=as_real)
     motor_friction: AbstractFriction | AbstractSwitchingFriction
     joint_friction: AbstractFriction
@@ -102,6 +103,11 @@ class DriveTrain(eqx.Module):
         return self.sticks or isinstance(self.branch, AbstractSwitchingBranch)
 
     @property
+    def invertible(self) -> bool:
+        """Whether every part has an inverse, as feed-forwards need it."""
+        return not self.switches and not isinstance(self.stiffness, Backlash)
+
+    @property
     def extra_order(self) -> int:
         """Derivatives that the exact inverse needs beyond those of an ideal motor."""
         return 0 if self.motor.lag is None else 1
@@ -126,8 +132,13 @@ class DriveTrain(eqx.Module):
         References:
             [Reiner2010] (2.7), (2.9), (2.19), the linear damper of section 2.3.2.
         """
-        spring = _spring(self)
-        torque = compose(spring.torque, torsion) + torsion_rate * self.damping
+        match self.stiffness:
+            case Backlash() as gap:
+                spring = gap.contact
+                torque = gap.torque(torsion, torsion_rate, self.damping)
+            case _:
+                spring = _spring(self)
+                torque = compose(spring.torque, torsion) + torsion_rate * self.damping
         if self.branch is None:
             return torque
         return torque + self.branch.torque(spring, torsion, _given(memory))
@@ -152,11 +163,15 @@ class DriveTrain(eqx.Module):
 
     def resting_torque(self, torsion: PerJoint) -> PerJoint:
         """Torque of the gear [N m] at rest, loaded once up to `torsion` [rad]."""
-        spring = _spring(self)
+        match self.stiffness:
+            case Backlash() as gap:
+                spring, torque = gap.contact, gap.resting_torque(torsion)
+            case _:
+                spring = _spring(self)
+                torque = spring.torque(torsion)
         if self.branch is None:
-            return spring.torque(torsion)
-        memory = self.branch.rest(torsion)
-        return spring.torque(torsion) + self.branch.torque(spring, torsion, memory)
+            return torque
+        return torque + self.branch.torque(spring, torsion, self.branch.rest(torsion))
 
     def behind_teeth(self, theta: Any) -> Any:
         """Angle behind the teeth [rad] at the motor angle `theta`, array or series."""
@@ -265,7 +280,7 @@ class DriveTrain(eqx.Module):
 
 
 def _spring(drives: DriveTrain) -> AbstractStiffness:
-    if drives.stiffness is None:
+    if not isinstance(drives.stiffness, AbstractStiffness):
         raise ValueError("a rigid gear has no torque of its own: use elastic gears")
     return drives.stiffness
 

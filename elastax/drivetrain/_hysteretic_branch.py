@@ -190,6 +190,62 @@ class ExactStopBranch(AbstractSwitchingBranch):
         return dataclasses.replace(self, stiffness=factor * self.stiffness)
 
 
+class ExactHysteresisBranch(AbstractSwitchingBranch):
+    r"""`HysteresisBranch` with exact plays, for plants.
+
+    Attributes:
+        input_weight: $w_0 > 0$ of the torsion itself, shape (joints,).
+        weights: $w_i \le 0$ of the plays, shape (plays, joints), with $w_0 + \sum w_i >
+            0$.
+        thresholds: $r_i > 0$ [rad].
+
+    Raises:
+        ValueError: a weight has the wrong sign, the sum of all or a threshold is not
+            positive, or shapes differ.
+
+    References:
+        [Reiner2010] (2.13), (2.14), (2.19), with the sign condition of a gear that
+        loses energy.
+    """
+
+    input_weight: PerJoint = eqx.field(converter=as_real)
+    weights: Float[Array, "plays joints"] = eqx.field(converter=as_real)
+    thresholds: Float[Array, "plays joints"] = eqx.field(converter=as_real)
+
+    def __check_init__(self):
+        check_fields(self)
+        _check_weights(self.input_weight, self.weights)
+        check_values(
+            "`thresholds` must be positive", self.thresholds, self.thresholds > 0
+        )
+
+    @property
+    def states(self) -> int:
+        return self.thresholds.shape[0]
+
+    def rest(self, torsion: PerJoint) -> Float[Array, "states joints"]:
+        return self.memory_after(torsion, jnp.zeros_like(self.thresholds))
+
+    def torque(
+        self,
+        spring: AbstractStiffness,
+        torsion: PerJoint,
+        memory: Float[Array, "states joints"],
+    ) -> PerJoint:
+        outputs = self.memory_after(torsion, memory)
+        change = (self.input_weight - 1.0) * torsion
+        change = change + jnp.sum(self.weights * outputs, axis=0)
+        return spring.secant(torsion) * change
+
+    def memory_after(
+        self, torsion: PerJoint, memory: Float[Array, "states joints"]
+    ) -> Float[Array, "states joints"]:
+        return play(torsion[None], memory, self.thresholds)
+
+    def scaled(self, factor: Float[Array, "..."] | float) -> "ExactHysteresisBranch":
+        return self  # the factor is in the spring
+
+
 def _check_number(values, number: int) -> None:
     if values.shape[0] != number:
         raise ValueError(

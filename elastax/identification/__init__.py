@@ -4,6 +4,11 @@ from ._evaluate import (
     RecordingReport as RecordingReport,
     evaluate_recording as evaluate_recording,
 )
+from ._hysteresis_fit import (
+    HysteresisFit as HysteresisFit,
+    fit_hysteresis as fit_hysteresis,
+    suggest_thresholds as suggest_thresholds,
+)
 from ._law_fit import LawFit as LawFit, fit_law as fit_law
 from ._recording import Recording as Recording, recorded_reference as recorded_reference
 from ._recording_fit import (

@@ -58,9 +58,20 @@ class AbstractInverse(eqx.Module):
         """
 
 
+def check_model(inverse: AbstractInverse, model: ElasticRobot) -> None:
+    """Refuse a model with exact parts that have no inverse."""
+    if not model.drives.invertible:
+        raise ValueError(
+            f"{type(inverse).__name__} needs drive trains whose parts have an inverse: "
+            "leave exact parts that switch to the plant and give the model their "
+            "smooth counterparts"
+        )
+
+
 def check_reference(inverse: AbstractInverse, model: ElasticRobot, reference) -> None:
     """Refuse a reference that does not fit the inverse or the model."""
     require_float64(type(inverse).__name__)
+    check_model(inverse, model)
     reference.require_order(inverse.order(model))
     axes = reference.derivatives.shape[2]
     if axes != model.axes:

@@ -10,7 +10,7 @@ import numpy as np
 
 from .._custom_types import Scalar, require_float64
 from ..dynamics import ElasticRobot, MotorSample
-from ._base import AbstractInverse
+from ._base import AbstractInverse, check_model
 from ._flat import FlatLayout
 
 
@@ -42,6 +42,7 @@ def step_program(inverse: AbstractInverse, model: ElasticRobot) -> StepProgram:
         ValueError: JAX runs in single precision, or a part is complex.
     """
     require_float64(type(inverse).__name__)
+    check_model(inverse, model)
     arrays, rest = _parts(inverse, model)
     parameters = FlatLayout.of(arrays)
     shape = (inverse.order(model) + 1, model.axes)

@@ -12,32 +12,53 @@ from ..drivetrain import DriveTrain
 from ._toml import load_toml
 
 
+_FRICTION: dict[str, type] = {
+    "asymmetric": drivetrain.AsymmetricFriction,
+    "breakaway": drivetrain.BreakawayFriction,
+    "coulomb_viscous": drivetrain.CoulombViscousFriction,
+    "piecewise": drivetrain.PiecewiseFriction,
+    "stribeck": drivetrain.StribeckFriction,
+    "temperature": drivetrain.TemperatureFriction,
+    "two_scale": drivetrain.TwoScaleFriction,
+}
+_STIFFNESS: dict[str, type] = {
+    "backlash": drivetrain.BacklashStiffness,
+    "cubic": drivetrain.CubicStiffness,
+    "exponential": drivetrain.ExponentialStiffness,
+    "limited": drivetrain.LimitedStiffness,
+    "linear": drivetrain.LinearStiffness,
+    "table": drivetrain.TabulatedStiffness,
+}
 # name in a file -> class, by the part of the drive train that it may stand for
 KINDS: dict[str, dict[str, type]] = {
-    "motor_friction": {
-        "coulomb_viscous": drivetrain.CoulombViscousFriction,
-        "two_scale": drivetrain.TwoScaleFriction,
+    "motor": {"motor": drivetrain.Motor},
+    "motor_friction": _FRICTION | {"exact": drivetrain.StickSlipFriction},
+    "joint_friction": _FRICTION,
+    "mesh": {
+        "efficiency": drivetrain.DirectionalEfficiency,
+        "load_friction": drivetrain.LoadFriction,
+        "exact": drivetrain.ExactEfficiency,
     },
-    "stiffness": {
-        "linear": drivetrain.LinearStiffness,
-        "cubic": drivetrain.CubicStiffness,
-        "limited": drivetrain.LimitedStiffness,
-    },
+    "transmission_error": {"fourier": drivetrain.TransmissionError},
+    "stiffness": _STIFFNESS | {"exact_backlash": drivetrain.Backlash},
     "branch": {
         "relaxation": drivetrain.RelaxationBranch,
         "stops": drivetrain.StopBranch,
         "hysteresis": drivetrain.HysteresisBranch,
+        "exact_hysteresis": drivetrain.ExactHysteresisBranch,
         "exact_stops": drivetrain.ExactStopBranch,
     },
-    "motor": {"motor": drivetrain.Motor},
 }
 # laws that other laws hold
 HELD: dict[str, type] = {
+    **_FRICTION,
+    **_STIFFNESS,
+    "constant": drivetrain.ConstantEfficiency,
+    "falling": drivetrain.FallingEfficiency,
     "rate_independent": drivetrain.RateIndependentPlay,
     "delayed": drivetrain.DelayedPlay,
     "pade": drivetrain.PadeDelay,
 }
-KINDS["joint_friction"] = KINDS["motor_friction"]
 
 
 def load_drive_parts(path: str | pathlib.Path, drives: DriveTrain) -> DriveTrain:
@@ -119,8 +140,7 @@ def _law(table: dict[str, Any], kinds: dict[str, type], axes: int, where: str):
 
 def _value(value: Any, field, axes: int, where: str):
     if isinstance(value, dict):
-        every = HELD | KINDS["motor_friction"] | KINDS["stiffness"]
-        return _law(value, every, axes, where)
+        return _law(value, HELD, axes, where)
     if field.metadata.get("static", False):
         return value
     shape = getattr(_array_type(field.type), "dim_str", "")

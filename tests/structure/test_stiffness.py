@@ -118,6 +118,18 @@ def test_laws_are_odd_and_the_tangent_is_the_derivative(spring):
 
 
 @each_spring
+def test_secant_is_torque_over_torsion_and_the_tangent_at_zero(spring):
+    torsion = jnp.array([1e-12, 1e-3, 0.3, 1.0, 3.0, 1e3])[:, None] * TORSION[None]
+    law = jax.jit(jax.vmap(lambda s, x: (s.torque(x), s.secant(x)), (None, 0)))
+    torque, secant = law(spring, torsion)
+    assert_close(secant, torque / torsion, rtol=1e-15)
+    assert_close(spring.secant(-TORSION), spring.secant(TORSION), rtol=0.0)
+    zero = jnp.zeros(2)
+    assert_close(spring.secant(zero), spring.stiffness(zero), rtol=1e-15)
+    assert_close(derivative(spring.secant, zero), zero, rtol=0.0)
+
+
+@each_spring
 def test_potential_is_the_integral_of_the_torque(spring):
     for index, one in enumerate((0, 1)):
         single = jax.tree.map(lambda leaf: leaf[one], spring)
@@ -201,7 +213,7 @@ def test_extremes_are_finite(spring):
 
     def everything(spring, argument):
         results = []
-        for name in ("torque", "torsion", "potential", "stiffness"):
+        for name in ("torque", "torsion", "potential", "stiffness", "secant"):
             law = lambda s, x, name=name: jnp.sum(getattr(s, name)(x))
             slope = jax.grad(law, argnums=1)
             ones = jnp.ones_like(argument)

@@ -15,18 +15,19 @@ class DelayedPlay(AbstractSmoothPlay):
     r"""The approximate play $P^*$: (2.13) with soft limits and a Pade delay.
 
     $y = \mathrm{smax}(x - r,\ \mathrm{smin}(x + r,\ y(t - T_t)))$, where the output
-    delayed by $T_t$ stands for the one of the sample before. Three results that the
+    delayed by $T_t$ stands for the one of the sample before. Four results that the
     text does not give tell how to choose $\psi$ and $T_t$:
 
     - at a constant input the output goes to $x + \mathrm{asinh}(e^{-\psi r}/2)/\psi$
-      from every start: the memory is lost, within about $T_t\,e^{\psi r}/2$;
-    - on a ramp of the speed v it trails by $-\ln(1 - e^{-\psi v T_t})/\psi$ from the
+      from every start: the memory is lost, with the time constant $T_t\,e^{\psi r}/2$;
+    - on a ramp of the speed v it is off by $-\ln(1 - e^{-\psi v T_t})/\psi$ from the
       exact play, so that a shorter delay makes it worse at fixed $\psi$;
+    - turned at once from the speed v to -v it stays off by $v T_t/4$: the delay holds
+      what came before the turn and what came after it;
     - for $r = 0$ it is off by $\ln((1 + \sqrt5)/2)/\psi$: take the input itself there.
 
     So $\psi \ge \max(3/(v T_t),\ \ln(2 t_{hold}/T_t)/r)$ for the slowest speed v and
-    the longest hold $t_{hold}$. `RateIndependentPlay` has neither the first nor the
-    second of these errors.
+    the longest hold $t_{hold}$. `RateIndependentPlay` has none of these errors.
 
     Attributes:
         thresholds: $r_i > 0$, shape (plays, joints), in the unit of the input.

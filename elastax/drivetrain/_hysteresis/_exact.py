@@ -38,7 +38,9 @@ class PrandtlIshlinskii(eqx.Module):
     of one input can have: $|y_{0,i+1} - y_{0,i}| \le r_{i+1} - r_i$. The text's
     conditions (2.15) are not sufficient: a smallest threshold above zero is a dead
     zone, which nothing can undo, and unsorted thresholds break (2.16). It is not
-    needed that the weights be positive.
+    needed that the weights be positive. Weights are what is stored: where those of
+    this operator and of its inverse add up to $S$ and $S'$ in magnitude, the round trip
+    holds to some $\epsilon S S'$ times the signal, by the condition of the task.
 
     Attributes:
         weights: $w_i$, shape (plays,) or (plays, joints).
@@ -105,14 +107,17 @@ class PrandtlIshlinskii(eqx.Module):
             ValueError: a condition for the inverse is not met.
         """
         _check_invertible(self)
-        w, r, y = self.weights, self.thresholds, self.initial
+        w, y = self.weights, self.initial
         total = jnp.cumsum(w, axis=0)
-        weighted = w * y
-        behind = jnp.sum(weighted, axis=0)[None] - jnp.cumsum(weighted, axis=0)
+        # the sums by parts: gaps and steps times positive factors, without cancellation
+        gaps = total[:-1] * jnp.diff(self.thresholds, axis=0)
+        steps = -total[:-1] * jnp.diff(y, axis=0)
+        last = total[-1:] * y[-1:]
+        inner = last + jnp.cumsum(steps[::-1], axis=0)[::-1]
         return PrandtlIshlinskii(
             jnp.concatenate([1.0 / w[:1], -w[1:] / (total[1:] * total[:-1])]),
-            total * r - jnp.cumsum(w * r, axis=0),
-            total * y + behind,
+            jnp.concatenate([jnp.zeros_like(w[:1]), jnp.cumsum(gaps, axis=0)]),
+            jnp.concatenate([inner, last]),
         )
 
 

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from ..._checks import check_fields, check_values
 from ..._custom_types import as_real
-from ..._smooth import logistic, softplus
+from ..._smooth import logistic
 from ._play_base import AbstractSmoothPlay
 
 
@@ -20,21 +20,22 @@ class RateIndependentPlay(AbstractSmoothPlay):
 
     While the input rises, $e^{\psi y} - e^{\psi(x - r)}$ stays constant, while it falls
     $e^{-\psi y} - e^{-\psi(x + r)}$: the output is the soft maximum (2.17a) of $x - r$
-    and of where the last reversal left it, or the soft minimum, without a delay. What
-    follows, for speeds well above $v_0$ and $|x - y| \le r$ at the start:
+    and of where the last reversal left it, or the soft minimum, without a delay. From
+    a start with $|x - y| \le r$, with turns at accelerations a, $v_0^2 \ll a/\psi$:
 
-    - the output follows the path of the input and not its speed;
+    - the output follows the path of the input and not its speed; every reversal moves
+      it by less than $v_0^2/(2a)$ beyond that path;
     - at rest nothing creeps: the memory of a hold is exact, for every length of it;
-    - $|x - y| \le r$ forever, and the output differs from the exact play's by
-      $\ln 2/\psi$ per reversal at most, far less once the input has moved on by some
-      $1/\psi$ beyond the corner;
-    - inner cycles that keep the distance m to both limits move the output by less than
-      $e^{-\psi m}/\psi$ each: the leak of the memory.
+    - $|x - y| \le r + v_0^2/(2a)$, and at no speed does it exceed $r + 0.74/\psi$;
+    - the output differs from the exact play's by $\ln 2/\psi$ per reversal at most, far
+      less once the input has moved on by some $1/\psi$ beyond the corner;
+    - an inner cycle within $|x - y| \le r - m$ moves the output by less than
+      $-\ln(1 - e^{-\psi m})/\psi$, about $e^{-\psi m}/\psi$: the leak of the memory.
 
-    Below $v_0$ the direction is uncertain and the output moves along one path in both;
-    $v_0$ smooths the corner of the rate at a reversal, nothing else. The operator is
-    ours; peers smooth the play by a delay, as the text does, or by Bouc's equation,
-    whose corner is wider and whose small cycles drift.
+    Below $v_0$ the direction is uncertain and the output moves along one path in both:
+    a motion that stays this slow has no hysteresis. The operator is ours; peers smooth
+    the play by a delay, as the text does, or by Bouc's equation, whose corner is wider
+    and whose small cycles drift.
 
     Attributes:
         thresholds: $r_i > 0$, shape (plays, joints), in the unit of the input.
@@ -72,11 +73,16 @@ class RateIndependentPlay(AbstractSmoothPlay):
         return self.number
 
     def rest(self, x: Float[Array, " joints"]) -> Float[Array, "states joints"]:
-        psi, size = self.sharpness[None], jnp.abs(x)[None]
-        # e^(psi y) = 1 - e^(-psi r) + e^(psi (|x| - r))
-        start = jnp.log1p(-jnp.exp(-psi * self.thresholds))
-        reached = start + softplus(psi * (size - self.thresholds) - start)
-        return jnp.sign(x)[None] * reached / psi
+        # e^(psi y) = 1 - e^(-psi r) + e^(psi (|x| - r)), below and above the corner
+        psi, r = self.sharpness[None], self.thresholds
+        negative = x < 0
+        size = jnp.where(negative, -x, x)[None]
+        inside = size <= r
+        below = jnp.exp(-psi * r) * jnp.expm1(psi * jnp.where(inside, size, r))
+        beyond = psi * jnp.where(inside, 0.0, size - r)
+        above = beyond + jnp.log1p(-jnp.exp(-beyond) * jnp.expm1(-psi * r))
+        reached = jnp.where(inside, jnp.log1p(below), above) / psi
+        return jnp.where(negative[None], -reached, reached)
 
     def outputs(
         self, x: Float[Array, " joints"], states: Float[Array, "states joints"]
@@ -124,6 +130,7 @@ def _approach(gap, way):
 
 def _growth(z):
     """The exponential up to zero, continued by its parabola: no overflow."""
-    safe = jnp.minimum(z, 0.0)
-    excess = jnp.maximum(z, 0.0)
-    return jnp.where(z > 0.0, 1.0 + excess + 0.5 * excess**2, jnp.exp(safe))
+    above = z > 0.0
+    safe = jnp.where(above, 0.0, z)
+    excess = jnp.where(above, z, 0.0)
+    return jnp.where(above, 1.0 + excess + 0.5 * excess**2, jnp.exp(safe))
