@@ -1,5 +1,7 @@
 """Exact backlash: teeth that part, touch and never pull."""
 
+import dataclasses
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -71,7 +73,8 @@ class Backlash(eqx.Module):
         contact where its load is large enough, and else somewhere in the gap.
         """
         delta, end = torsion - self.centre, 0.25 * self.width
-        line = self.contact.torque(end) / (0.75 * self.width + (self.width == 0))
+        reach = jnp.where(self.width > 0, 0.75 * self.width, jnp.ones_like(end))
+        line = self.contact.torque(end) / reach
         inside = jnp.abs(delta) < 0.75 * self.width
         contact = self.contact.torque(self._depth(torsion))
         return jnp.where(inside, line * delta, contact)
@@ -79,6 +82,15 @@ class Backlash(eqx.Module):
     def potential(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
         """Energy [J] in the teeth in contact."""
         return self.contact.potential(self._depth(torsion))
+
+    def stiffness(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
+        """Tangent stiffness [N m/rad]: that of the contact, or zero in the gap."""
+        depth = self._depth(torsion)
+        return jnp.where(depth == 0, 0.0, self.contact.stiffness(depth))
+
+    def scaled(self, factor: Float[Array, "..."] | float) -> "Backlash":
+        """The same gap with the torque of the contact multiplied by `factor` > 0."""
+        return dataclasses.replace(self, contact=self.contact.scaled(factor))
 
     def torsion(self, torque: Float[Array, "..."]) -> Float[Array, "..."]:
         """Torsion [rad] at rest in contact under a torque other than zero."""

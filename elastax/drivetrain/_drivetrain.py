@@ -192,7 +192,7 @@ class DriveTrain(eqx.Module):
         if self.transmission_error is None:
             return theta, thetad
         angle = self.transmission_error.output_angle(theta)
-        return angle, thetad / self._speed_ratio(angle)
+        return angle, thetad / _speed_ratio(self.transmission_error, angle)
 
     def motor_load(
         self,
@@ -242,7 +242,8 @@ class DriveTrain(eqx.Module):
     def _drive(self, load, angle, thetad, direction):
         """Torque that drives the teeth when they hand on `load`."""
         if self.transmission_error is not None:
-            load = load / self._speed_ratio(angle)  # no loss: equal powers
+            # no loss: equal powers
+            load = load / _speed_ratio(self.transmission_error, angle)
         match self.mesh:
             case None:
                 return load
@@ -252,11 +253,6 @@ class DriveTrain(eqx.Module):
                 return exact.drive_torque(load, thetad, direction)
             case mesh:
                 return mesh.drive_torque(load, thetad)
-
-    def _speed_ratio(self, angle):
-        """Motor speed over the speed behind the teeth, one for an ideal ratio."""
-        slope = self.transmission_error.motor_angle
-        return jax.jvp(slope, (angle,), (jnp.ones_like(angle),))[1]
 
     def rigid(self) -> "DriveTrain":
         """The same drive trains with rigid gears."""
@@ -277,6 +273,12 @@ class DriveTrain(eqx.Module):
     def to_output_angle(self, angle: PerJoint) -> PerJoint:
         """Output-side angle [rad] (or speed) of a motor-side one."""
         return angle / self.ratio
+
+
+def _speed_ratio(error: TransmissionError, angle):
+    """Motor speed over the speed behind the teeth, one for an ideal ratio."""
+    # not `error.ratio`: its derivatives are those of the angle, in any order
+    return jax.jvp(error.motor_angle, (angle,), (jnp.ones_like(angle),))[1]
 
 
 def _spring(drives: DriveTrain) -> AbstractStiffness:

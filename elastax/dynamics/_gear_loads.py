@@ -1,7 +1,7 @@
 """What the drive trains exchange with the links and ask of the motors."""
 
 from .._custom_types import PerJoint
-from ..drivetrain import GearMemory
+from ..drivetrain import AbstractSwitchingFriction, GearMemory
 from ._robot import ElasticRobot
 
 
@@ -63,12 +63,16 @@ def rigid_motor_load(robot: ElasticRobot, qd: PerJoint) -> PerJoint:
 
     Raises:
         ValueError: the drive trains have a mesh or a transmission error, whose torques
-            behind rigid gears would depend on the accelerations.
+            behind rigid gears would depend on the accelerations, or exact friction.
     """
-    drives = robot.drives
+    drives, friction = robot.drives, robot.drives.motor_friction
     if drives.mesh is not None or drives.transmission_error is not None:
         raise ValueError(
             "the dynamics of rigid gears know neither `mesh` nor `transmission_error`: "
             "take elastic gears, or drive trains without these parts"
         )
-    return drives.motor_friction.torque(qd)
+    if isinstance(friction, AbstractSwitchingFriction):
+        raise ValueError(
+            "the dynamics of rigid gears need smooth friction: exact friction sticks"
+        )
+    return friction.torque(qd)

@@ -130,7 +130,8 @@ def simulate_switching(
     times = jnp.asarray(times)
     largest = jnp.asarray(times[1] - times[0] if step is None else step, x0.dtype)
     atol = jnp.broadcast_to(jnp.asarray(atol, x0.dtype), x0.shape)
-    term: Any = dfx.ODETerm(lambda t, x, mode: system.rates(t, x, mode))
+    field: Any = system.rates
+    term: Any = dfx.ODETerm(lambda t, x, mode: field(t, x, mode))
     order = jnp.asarray(solver.order(term), x0.dtype)
 
     def attempt(t0, t1, x, mode):

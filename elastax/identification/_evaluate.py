@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ..drivetrain import AbstractSwitchingFriction
 from ..dynamics import ElasticRobot
 from ..signals import AbstractFilter
 from ._recording import Recording
@@ -103,7 +104,10 @@ def evaluate_recording(
     if held is None and fit:
         held = fit_along(robot, recording, command, STEEPNESS_GRID)
         model = held.robot
-    friction = jax.vmap(model.drives.motor_friction.torque)(command.thetad)
+    law = model.drives.motor_friction
+    if isinstance(law, AbstractSwitchingFriction):
+        raise ValueError("recordings are evaluated with smooth friction")
+    friction = jax.vmap(law.torque)(command.thetad)
     encoders = recording.encoders
     chosen = np.array(encoders or range(recording.axes))
 

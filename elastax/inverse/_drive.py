@@ -8,7 +8,13 @@ from jaxtyping import Array, Float
 from .._custom_types import PerJoint, Scalar
 from .._kernel import kernel
 from .._taylor import Series
-from ..drivetrain import AbstractStiffness, DriveTrain, GearMemory
+from ..drivetrain import (
+    AbstractGearBranch,
+    AbstractStiffness,
+    AbstractSwitchingBranch,
+    DriveTrain,
+    GearMemory,
+)
 from ..dynamics import MotorSample
 from ._memory_response import advance_memory, gear_field, memory_response
 from ._response import advance, response
@@ -54,6 +60,17 @@ def gear_spring(drives: DriveTrain) -> AbstractStiffness:
     if not isinstance(drives.stiffness, AbstractStiffness):
         raise ValueError("this inverse needs a model with elastic gears")
     return drives.stiffness
+
+
+def smooth_branch(drives: DriveTrain) -> AbstractGearBranch | None:
+    """The gears' branch.
+
+    Raises:
+        ValueError: it is an exact one, which has no inverse.
+    """
+    if isinstance(drives.branch, AbstractSwitchingBranch):
+        raise ValueError("exact hysteresis has no inverse: give the model a smooth one")
+    return drives.branch
 
 
 def resting_gear(drives: DriveTrain, load: Series) -> GearState:
@@ -114,9 +131,10 @@ def advance_gear(
     References:
         [Reiner2010] (3.93a) in the relative angle.
     """
-    if drives.branch is None or drives.branch.path() is not None:
+    branch = smooth_branch(drives)
+    if branch is None or branch.path() is not None:
         return _advance_on_path(drives, gear, before, after, dt)
-    field = gear_field(drives, drives.branch)
+    field = gear_field(drives, branch)
     now = advance_memory(field, gear.augmented(), -before, -after, dt)
     return GearState(now[0], now[1:])
 
@@ -124,16 +142,18 @@ def advance_gear(
 @kernel
 def _advance_on_path(drives: DriveTrain, gear: GearState, before, after, dt):
     """The torsion alone is integrated: the memory, if any, follows it."""
+    branch = smooth_branch(drives)
+    path = None if branch is None else branch.path()
 
     def memory(torsion):
-        if drives.branch is None:
+        if path is None:
             return gear.memory
-        return drives.branch.path()(gear.torsion, gear.memory, torsion)
+        return path(gear.torsion, gear.memory, torsion)
 
     def spring(torsion):
         return drives.gear_torque(torsion, 0.0 * torsion, memory(torsion))
 
-    if drives.branch is None:
+    if branch is None:
         spring = gear_spring(drives).torque
     else:  # plays turn within a sample: a higher order would see their corners
         before, after = before.truncated(1), after.truncated(1)
@@ -220,8 +240,9 @@ def motors_behind(
 
 def _torsion_series(drives: DriveTrain, gear: GearState, load: Series) -> Series:
     """The torsion with its derivatives, one order more than the load."""
-    if drives.branch is None:
+    branch = smooth_branch(drives)
+    if branch is None:
         spring = gear_spring(drives).torque
         return response(spring, drives.damping, gear.torsion, -load)
-    field = gear_field(drives, drives.branch)
+    field = gear_field(drives, branch)
     return memory_response(field, gear.augmented(), -load)[0]
