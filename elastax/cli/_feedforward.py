@@ -73,6 +73,10 @@ def feedforward(config: FeedforwardConfig, progress: Progress) -> int:
     """
     robot = with_payload(named_robot(config.robot), config.payload)
     robot = with_parts(robot, config.parts)
+    if not robot.drives.invertible:
+        raise ValueError(
+            f"{config.parts}: an exact part has no inverse: give it with --plant-parts"
+        )
     plant = with_parts(robot, config.plant_parts)
     _check(config)
     result = {"schema": SCHEMA, "robot": robot.name, "versions": versions()}

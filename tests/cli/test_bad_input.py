@@ -7,6 +7,7 @@ import pytest
 from elastax.cli import main
 
 
+PARTS = pathlib.Path(__file__).parents[2] / "examples" / "drive_parts"
 EXAMPLE = pathlib.Path(__file__).parents[2] / "examples" / "robot.toml"
 UR10E = str(EXAMPLE.with_name("ur10e.urdf"))
 
@@ -61,6 +62,12 @@ def edited(tmp_path, old: str, new: str) -> str:
         (("--path", "nowhere.csv"), ("--path", "nowhere.csv")),
         (("--recording", "nowhere.mat"), ("nowhere.mat",)),
         (("--identify-on", "a.mat"), ("--recording",)),
+        (("--parts", "nowhere.toml"), ("nowhere.toml", "cannot be read")),
+        (("--parts", str(PARTS / "exact_friction.toml")), ("--plant-parts",)),
+        (
+            ("--plant-parts", str(PARTS / "lag.toml"), "--grid", "2"),
+            ("--plant-parts", "--grid"),
+        ),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
 )

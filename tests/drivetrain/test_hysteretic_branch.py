@@ -302,15 +302,44 @@ def test_jit_vmap_and_loop_agree(build):
     assert_close(jax.jit(jax.vmap(law))(torsion), loop, rtol=1e-13, atol=1e-12)
 
 
-@pytest.mark.slow
-def test_gauss_newton_recovers_stiffness_and_thresholds_from_half_of_them():
-    # the sharpness is held; the loop passes both thresholds even at 150 per cent
-    def measured(values):
-        play = RateIndependentPlay(values[1], PLAYS[0].sharpness, jnp.full(2, 1e-3))
-        branch = StopBranch(values[0], play)
-        return run(branch, cycles=1, steps=1000)[1].ravel()
+def of_stops(values):
+    play = RateIndependentPlay(values[2:], PLAYS[0].sharpness, jnp.full(2, 1e-3))
+    return StopBranch(values[:2], play)
 
-    true = jnp.stack([stops().stiffness, THRESHOLDS])
+
+def of_modulated(values):
+    play = RateIndependentPlay(values[3:], PLAYS[0].sharpness, jnp.full(2, 1e-3))
+    return HysteresisBranch(values[0], -values[1:3], play)
+
+
+def of_delayed(values):
+    play = DelayedPlay(values[2:], PLAYS[1].sharpness, PadeDelay(2e-3, 3))
+    return StopBranch(values[:2], play)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("build", "true"),
+    [
+        (of_stops, [*stops().stiffness, *THRESHOLDS]),
+        (
+            of_modulated,
+            [modulated().input_weight, *-modulated().weights, *THRESHOLDS],
+        ),
+        (of_delayed, [*stops().stiffness, *THRESHOLDS]),
+    ],
+    ids=["stops", "modulated", "delayed"],
+)
+def test_gauss_newton_recovers_from_half(build, true):
+    """Stiffness or weights and thresholds; the sharpness is held.
+
+    The loop passes both thresholds even at half more than they are.
+    """
+    true = jnp.stack(true)
+
+    def measured(values):
+        return run(build(values), cycles=1, steps=1000)[1].ravel()
+
     target = measured(true)
     jacobian = jax.jit(jax.jacfwd(lambda v: measured(v.reshape(true.shape))))
     values = 0.5 * true
@@ -320,8 +349,11 @@ def test_gauss_newton_recovers_stiffness_and_thresholds_from_half_of_them():
         # no step may take more than half of a value away
         values = values * jnp.maximum(1.0 + step.reshape(true.shape), 0.5)
     # which play is the first is not observable
-    order = jnp.argsort(values[1], axis=0)
-    values = jnp.stack([jnp.take_along_axis(v, order, axis=0) for v in values])
+    rows = len(true) - 4
+    order = jnp.argsort(values[-2:], axis=0)
+    pairs = values[rows:].reshape(2, 2, 2)
+    pairs = jnp.stack([jnp.take_along_axis(pair, order, axis=0) for pair in pairs])
+    values = jnp.concatenate([values[:rows], pairs.reshape(4, 2)])
     assert_close(values, true, rtol=1e-6)
 
 
