@@ -9,6 +9,7 @@ not. Writes `drive_parts.json` and `DRIVE_PARTS.md`.
 
 import argparse
 import dataclasses
+import functools
 import json
 import pathlib
 import sys
@@ -49,14 +50,21 @@ def with_part(robot: ElasticRobot, name: str | None) -> ElasticRobot:
     return dataclasses.replace(robot, drives=drives)
 
 
+@functools.cache
+def unaware():
+    """Command of an inverse that knows none of the parts, the same for all."""
+    robot = kr210()
+    reference = build_motion(robot, FeedforwardConfig()).reference
+    plain = Reference(reference.times, reference.derivatives[: ORDER + 1])
+    return bare(jax.jit(lambda m, r: ASIM().feedforward(m, r))(robot, plain))
+
+
 def figures(name: str | None) -> dict:
     """Row of one part."""
     robot, controller = kr210(), CascadeMotorControl()
     plant = with_part(robot, name)
     model = with_part(robot, COUNTERPARTS.get(name or "", name))
     reference = build_motion(model, FeedforwardConfig()).reference
-    # an inverse that does not know of a lag needs no more than this
-    plain = Reference(reference.times, reference.derivatives[: ORDER + 1])
     inverse = compile_timed(ASIM().feedforward, model, reference)
     command = inverse.call(model, reference)
     drive = lambda p, c, r: run_command(p, c, r, controller, throw=False)
@@ -67,8 +75,7 @@ def figures(name: str | None) -> dict:
         lambda: loop.call(plant, bare(command), reference),
     )
     simulation, known = loop.call(plant, bare(command), reference)
-    blind = bare(jax.jit(lambda m, r: ASIM().feedforward(m, r))(robot, plain))
-    _, ignored = loop.call(plant, blind, reference)
+    _, ignored = loop.call(plant, unaware(), reference)
     samples = reference.times.shape[0]
     duration = float(reference.times[-1] - reference.times[0])
     return {

@@ -56,6 +56,7 @@ def test_one_device_is_vmap():
     np.testing.assert_array_equal(result["y"], 2.0 * x.T)
 
 
+@pytest.mark.slow
 def test_sizes_axes_derivatives_and_nesting():
     run_on_two_devices("""
         def function(parameters, x, y):

@@ -93,6 +93,7 @@ def test_sums_with_series_arrays_and_numbers():
     assert_series(-x, lambda t: -vector(t))
 
 
+@pytest.mark.slow
 def test_products_follow_leibniz():
     x, y, a, c = series(vector), series(other), series(matrix), jnp.array([1.0, 2, 3])
     assert_series(x * y, lambda t: vector(t) * other(t))
@@ -141,6 +142,7 @@ def test_cross_product():
     assert_series(product("ij,j->i", skew(series(vector)), series(other)), expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "function",
     [jnp.tanh, jnp.arctan, jnp.exp, jax.nn.sigmoid],

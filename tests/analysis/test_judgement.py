@@ -102,6 +102,7 @@ def test_settling_time(robot):
     assert_close(figures.path_error_max, 0.0, rtol=0)
 
 
+@pytest.mark.slow
 def test_gradient(robot):
     """Also without any error, where the norm has a corner."""
     times = np.linspace(0.0, 1.5, 16)

@@ -138,6 +138,7 @@ def test_damping_dissipates(element):
     assert_close(power, -300.0 * rate**2, rtol=1e-12)
 
 
+@pytest.mark.slow
 @each_element
 def test_gradient(element):
     laws = lambda e, x: (e.torque(x), e.potential(x), e.force(x))

@@ -61,6 +61,7 @@ def test_vector_inverse():
     assert_close(drive, vector["outputs"]["tau_A"], rtol=vector["tol"])
 
 
+@pytest.mark.slow
 @each_mesh
 def test_inverses(mesh):
     """Both ways over twenty decades of load and fifteen of speed."""

@@ -31,6 +31,7 @@ def inputs(robot, seed: int = 4):
     return draw(), draw(), jnp.asarray(10.0 * rng.standard_normal(n + m))
 
 
+@pytest.mark.slow
 @each_robot
 def test_closed_form_is_autodiff(name):
     robot = ROBOTS[name]()
@@ -64,6 +65,7 @@ def _symmetric(robot):
     return dataclasses.replace(robot, chain=still, bodies=bodies, payload=payload)
 
 
+@pytest.mark.slow
 @each_robot
 def test_tangents_against_the_factorised_matrix(name):
     """Forward and reverse, against autodiff through mass matrix and Cholesky."""

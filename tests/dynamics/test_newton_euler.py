@@ -25,6 +25,7 @@ from tests.helpers import assert_close, assert_gradient, load_vectors
 SIZES = [(3, 2, False), pytest.param(8, 12, True, marks=pytest.mark.slow)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("axes", "elastic", "counterbalance"), SIZES)
 def test_lagrange_recursion_and_blocks_agree(axes, elastic, counterbalance):
     robot = systems.random_robot(axes, axes, elastic, counterbalance=counterbalance)
@@ -58,6 +59,7 @@ def test_lagrange_recursion_and_blocks_agree(axes, elastic, counterbalance):
     assert np.linalg.eigvalsh(mass).min() > 0
 
 
+@pytest.mark.slow
 def test_rigid_gears_by_two_routes():
     robot = systems.random_robot(5, 3, 2, counterbalance=True).rigid()
     states = systems.random_state(robot, 8, 3)
@@ -206,6 +208,7 @@ def test_elastic_robot_against_pinocchio(peer):
     assert n + robot.elastic == 14 and model.nv == 17
 
 
+@pytest.mark.slow
 def test_recursion_is_the_sum_of_screws():
     """With sliding axes among the turning ones."""
     robot = systems.random_robot(7, 4, 5, counterbalance=False)

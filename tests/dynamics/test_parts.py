@@ -93,6 +93,7 @@ def test_denavit_hartenberg_rows():
         )
 
 
+@pytest.mark.slow
 def test_rigid_structure_carries_the_same_bodies():
     """Forces of the flexible-joint robot are those of the undeformed elastic one."""
     robot = systems.random_robot(9, 3, 4, counterbalance=False)

@@ -94,6 +94,7 @@ def test_energy_balance():
     assert_close(energy - energy[0], given - lost, rtol=0, atol=bound)
 
 
+@pytest.mark.slow
 def test_reverse_gradient_is_a_finite_difference():
     robot = systems.two_mass_oscillator(**MASSES)
 
@@ -114,6 +115,7 @@ def test_reverse_gradient_is_a_finite_difference():
     assert_close(gradient, (ahead - behind) / (2 * step), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_vmap_is_a_loop():
     robots = [
         systems.two_mass_oscillator(**(MASSES | {"stiffness": c})) for c in (2e3, 5e4)

@@ -77,12 +77,14 @@ def test_order_of_convergence(order, expected):
     assert np.log2(errors[0] / errors[1]) > expected - 0.3
 
 
+@pytest.mark.slow
 def test_sample_of_a_millisecond():
     """The error of 0.2 s is a hundredth of the step of a 26-bit encoder."""
     error = np.asarray(respond(jnp.array(200.0), 1)) - exact()
     assert np.max(np.abs(error)) < 1e-2 * 2 * np.pi / 2**26
 
 
+@pytest.mark.slow
 def test_derivatives_of_the_response():
     """The series obeys its differential equation, term by term."""
     field = gear_field(DRIVES, DRIVES.branch)
@@ -102,6 +104,7 @@ def test_derivatives_of_the_response():
     assert_close(rate.coefficients[2], 0.5 * jax.jacfwd(slope)(zero), rtol=1e-11)
 
 
+@pytest.mark.slow
 def test_rest_carries_the_load():
     torque = jnp.array([120.0, -4000.0])
     gear = jax.jit(lambda t: resting_gear(DRIVES, Series(t[None])))(torque)

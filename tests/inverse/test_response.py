@@ -51,6 +51,7 @@ def respond(spring, x, duration, steps, order: int):
     return jax.lax.fori_loop(0, steps.astype(int), step, x)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SPRINGS)
 def test_order_of_convergence(name):
     """Order 5 with two derivatives of the forcing, order 3 with one."""

@@ -73,6 +73,7 @@ def stream(streamed, samples):
     return jax.tree.map(lambda *rows: np.stack(rows), *outputs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inverse", INVERSES, ids=lambda i: type(i).__name__)
 def test_equals_steps_offline(inverse, model, reference, samples):
     offline = eqx.filter_jit(feedforward_by_steps)(inverse, model, reference)

@@ -44,6 +44,7 @@ def operations(x, y):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 def test_every_operation(dtype):
     with np.errstate(over="ignore"):
@@ -237,6 +238,7 @@ programs = st.lists(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=12, deadline=None, derandomize=True, database=None)
 @given(steps=programs, kept=st.lists(st.integers(0, 30), min_size=1, max_size=4))
 def test_small_programs(steps, kept):

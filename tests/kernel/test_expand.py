@@ -245,6 +245,7 @@ each_family = pytest.mark.parametrize(
 )
 
 
+@pytest.mark.slow
 @each_family
 def test_values_and_derivatives(family, args):
     """Value, forward and reverse derivative in two programs, each compiled once."""
@@ -311,6 +312,7 @@ def test_every_rule_is_tested():
     assert seen - set(_RULES) == set()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "function",
     [

@@ -72,6 +72,7 @@ def test_results_that_nobody_reads_are_not_computed():
     assert "stablehlo.exponential" in both_read.lower(X, Y).as_text()
 
 
+@pytest.mark.slow
 @both
 def test_derivatives(definition):
     def evaluate(f):
@@ -102,6 +103,7 @@ def test_derivatives(definition):
     assert_same(evaluate(kernel(definition)), evaluate(definition), rtol=1e-10)
 
 
+@pytest.mark.slow
 @both
 def test_derivatives_of_batches(definition):
     """What a batch shares gets the sum of the cotangents; what it lacks gets zeros."""
@@ -133,6 +135,7 @@ def test_derivatives_of_batches(definition):
     assert_same(evaluate(kernel(definition)), evaluate(definition), rtol=1e-10)
 
 
+@pytest.mark.slow
 @both
 def test_loops(definition):
     def evaluate(f):

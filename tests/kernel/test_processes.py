@@ -8,6 +8,7 @@ import textwrap
 
 import jax
 import numpy as np
+import pytest
 
 
 PREAMBLE = """
@@ -59,6 +60,7 @@ def run_script(text: str, **variables: str) -> str:
     return done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_several_devices():
     """Each device computes for itself, or XLA splits: it cannot split a kernel."""
     run_script(
@@ -150,6 +152,7 @@ def numbers(output: str) -> np.ndarray:
     return np.array([float(x) for x in re.findall("^value (.*)", output, re.MULTILINE)])
 
 
+@pytest.mark.slow
 def test_switched_off():
     on = run_script(TABLE)
     off = run_script(TABLE, ELASTAX_KERNELS="0")

@@ -61,6 +61,7 @@ def test_what_is_cheap_is_computed_again():
     assert {found.depth[n] for n in results} == {1}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("worth", [1, 100, 10**6])
 def test_batches_agree_whatever_is_shared(worth, monkeypatch):
     """Values and derivatives; one axis, two axes that change different arguments."""

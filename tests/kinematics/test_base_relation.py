@@ -66,6 +66,7 @@ def test_exact_data():
     assert_close(found.residuals, jnp.zeros((SAMPLES, 6)), rtol=0.0, atol=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 def test_any_orientation_is_found(seed):
     """Of bases and grasps far away from all 24 starts."""

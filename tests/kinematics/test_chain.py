@@ -136,6 +136,7 @@ def test_jit_vmap_and_loop_agree():
     assert_close(mapped, loop, rtol=1e-13, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_gradient():
     q = jnp.array([0.3, -0.5, 0.7, 0.2, -0.9])
     assert_gradient(forward_kinematics, mixed(), q)

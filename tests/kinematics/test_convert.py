@@ -82,6 +82,7 @@ def assert_same_tool(converted, name):
     assert np.max(errors) < 1e-12
 
 
+@pytest.mark.slow
 @each_arm
 @pytest.mark.parametrize("convert", EVERYWHERE, ids=lambda f: f.__name__)
 def test_tool_stays_for_every_q(convert, name):

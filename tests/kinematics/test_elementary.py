@@ -98,6 +98,7 @@ def test_pose_is_that_of_the_chain(chain):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["dh", "modified dh", "hayati", "veitschegger-wu", "rpy", "mixed"]
 )

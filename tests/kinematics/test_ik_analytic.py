@@ -42,6 +42,7 @@ def assert_contains(solutions, valid, q, atol):
     assert np.min(np.where(valid, distance, np.inf)) <= atol, distance
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "case", load_vectors("003 (3-45)-(3-97)"), ids=["pose 1", "pose 2"]
 )
@@ -86,6 +87,7 @@ def test_published_kuka_signs():
     assert_close(solutions[0, :3], angles, rtol=1e-12)
 
 
+@pytest.mark.slow
 @each_arm
 def test_inverse_of_forward_kinematics(chain):
     arm = SphericalWrist.from_chain(chain)
@@ -115,6 +117,7 @@ def test_solutions_are_distinct(chain):
     assert np.min(distance) > 1e-3
 
 
+@pytest.mark.slow
 def test_iterative_solution_agrees():
     chain = puma()
     q = jnp.array([0.3, -1.0, 0.8, 0.5, 0.9, -0.4])
@@ -127,6 +130,7 @@ def test_iterative_solution_agrees():
     assert_close(nearest, q + 0.05, rtol=1e-11)
 
 
+@pytest.mark.slow
 @each_arm
 def test_derivative_is_the_inverse_jacobian(chain):
     arm = SphericalWrist.from_chain(chain)
@@ -141,6 +145,7 @@ def test_derivative_is_the_inverse_jacobian(chain):
         assert_close(matrix, jnp.eye(6), rtol=0.0, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_gradient_of_all_branches():
     joints = fanuc(1e-3).joints
     q = jnp.array([0.3, 1.2, -0.4, 0.5, 0.8, -1.1])
@@ -177,6 +182,7 @@ def test_lateral_offset_out_of_reach():
     assert not np.any(valid) and np.all(np.isfinite(solutions))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bend", [0.0, np.pi])
 def test_aligned_wrist_keeps_axis_4(bend):
     chain = fanuc(1e-3)

@@ -107,6 +107,7 @@ def test_singular_matrix_is_damped():
     assert_close(zero, jnp.zeros(3), rtol=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [(2, 3), (3, 2)])
 def test_series_are_nested_jvps(shape):
     rng = np.random.default_rng(4)
@@ -156,6 +157,7 @@ def test_limited_series_keeps_the_lowest_order():
     assert (step.order, compose(limiter, step).order) == (2, 2)
 
 
+@pytest.mark.slow
 def test_correction_gradient():
     case, chain, q, target, damping = published_step()
 
@@ -177,6 +179,7 @@ def test_characteristic_length_makes_units_irrelevant():
     assert_close(millimetres, metres, rtol=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chain", [kuka(), tilted()], ids=["kuka", "tilted"])
 def test_pose_is_reached(chain):
     solve = jax.jit(lambda target, q: solve_damped(chain, target, q, damping=DAMPING))
@@ -244,6 +247,7 @@ def test_half_a_turn_away_is_not_a_solution():
     assert near == bool(solution.result == PoseResults.successful)
 
 
+@pytest.mark.slow
 def test_derivative_is_that_of_the_implicit_function():
     chain = kuka()
 
@@ -260,6 +264,7 @@ def test_derivative_is_that_of_the_implicit_function():
     assert_close(start, jnp.zeros((6, 6)), rtol=0.0)
 
 
+@pytest.mark.slow
 def test_gradient_with_resting_joints():
     chain = mixed()
     q = jnp.array([0.3, 0.2, -0.5, 0.4, 0.7])
@@ -279,6 +284,7 @@ def test_gradient_with_resting_joints():
     assert_gradient(solve, chain, target, q.at[0].add(0.05))
 
 
+@pytest.mark.slow
 def test_jit_vmap_and_loop_agree():
     chain = kuka()
     starts = POSE[None] + jnp.array([0.0, 0.05, -0.1])[:, None]

@@ -46,6 +46,7 @@ def test_aligned_hand_axes(find, bend):
     assert found.smallest_singular_value < 2e-3
 
 
+@pytest.mark.slow
 def test_out_of_reach_is_the_nearest(find):
     """The arm stretches towards the target."""
     chain = kuka()

@@ -57,6 +57,7 @@ def test_noise_comes_back_as_residual(instrument):
     assert_close(found, noise, rtol=1e-7, atol=1e-9)
 
 
+@pytest.mark.slow
 @each
 def test_gradient(instrument):
     chain = heavy()

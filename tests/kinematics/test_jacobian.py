@@ -38,6 +38,7 @@ def test_geometric_is_autodiff(chain):
     assert_close(jacobian(chain, q), expected, rtol=1e-12, atol=1e-13)
 
 
+@pytest.mark.slow
 @each_chain
 def test_levers_are_columns_of_the_jacobian(chain):
     """Without link frames, of coordinates and of their series."""
@@ -53,6 +54,7 @@ def test_levers_are_columns_of_the_jacobian(chain):
     assert_close(columns, expected, rtol=1e-12, atol=1e-13 * scale)
 
 
+@pytest.mark.slow
 @each_chain
 def test_derivatives_are_nested_jvps(chain):
     motion = coordinates(chain, (4,))

@@ -156,6 +156,7 @@ def test_jacobian(name):
     assert_close(jacobian(chain, Q), expected, rtol=1e-13, atol=1e-14)
 
 
+@pytest.mark.slow
 @each_convention
 def test_gradient_by_every_parameter(name):
     assert_gradient(forward_kinematics, chain_of(name), Q)

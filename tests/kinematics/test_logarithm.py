@@ -99,6 +99,7 @@ def test_derivatives_are_finite_everywhere():
     assert_close(reverse, forward, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.199, 0.6, 3.1, np.pi - 1e-6])
 def test_derivative_of_the_round_trip_is_the_identity(angle):
     """Through both branches of both maps, and at zero."""

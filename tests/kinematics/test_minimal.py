@@ -145,6 +145,7 @@ def test_real_geometry_is_reproduced(name):
     assert errors[-1] < 1e-12
 
 
+@pytest.mark.slow
 @each_arm
 def test_no_parameter_can_be_spared(name):
     # without one of them a part of the real geometry stays, hence without more, too

@@ -183,6 +183,7 @@ def test_first_and_second_derivatives(chain):
     assert_close(hessian[j, i], one_by_one, rtol=0, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_jacobian_by_joints_and_parameters():
     chain = fanuc(1e-3)
     factors, parameters = elementary_chain(chain), ChainParameters.of(chain)

@@ -74,6 +74,7 @@ def _batched_lapack(program: str) -> bool:
     return any('num_batch_dims = "0"' not in line for line in calls)
 
 
+@pytest.mark.slow
 def test_feedforward_calls_no_lapack_on_batches():
     """Batched LAPACK calls that meet on two cores wait for ever (jaxlib 0.10)."""
     robot, inverse = kr210(), ASIM()

@@ -35,6 +35,7 @@ def test_kinematics_is_that_of_the_maker(robot):
     assert_close(ours[:3, 2], theirs[:3, 0], rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_first_eigenfrequencies(robot):
     find = eqx.filter_jit(locked_frequencies)
     large = kr210()

@@ -41,6 +41,7 @@ def rest(robot, theta):
     return q, eta, forward_kinematics(robot.chain, coordinates)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pose", ["stretched", "cannon", "upright"])
 def test_first_eigenfrequency(robot, pose):
     """Arms of this size with full load lie between 3 and 10 Hz."""

@@ -162,6 +162,7 @@ def test_ramp_lags_by_the_delay(filter):
     assert_close(y[1, -1, 0], 1.0, rtol=1e-11)
 
 
+@pytest.mark.slow
 @each_filter
 def test_frequency_response_of_the_states(filter):
     """The product over the poles against the vector field, two routes."""
@@ -211,6 +212,7 @@ def test_streaming_is_offline(family):
     assert_close(direct, hold(filter.init(u[0]), u[0], u[1]), rtol=1e-15)
 
 
+@pytest.mark.slow
 @each_family
 def test_jit_vmap_loop(family):
     _, u = samples(count=30)
@@ -230,6 +232,7 @@ def test_jit_vmap_loop(family):
     assert_close(channels / scale[0], loop[0] / scale[0], rtol=0.0, atol=1e-14)
 
 
+@pytest.mark.slow
 @each_family
 def test_gradient(family):
     _, u = samples(count=25)
@@ -239,6 +242,7 @@ def test_gradient(family):
     assert_gradient(response, family(4, 20.0), jnp.array([3.0, 100.0]), order=2)
 
 
+@pytest.mark.slow
 @each_family
 def test_limits(family):
     _, u = samples(count=10)

@@ -85,6 +85,7 @@ def test_jit_is_loop(kind, degree):
     assert_close(mapped(interpolant, t), loop, rtol=1e-14)
 
 
+@pytest.mark.slow
 @each_kind
 def test_gradient(kind, degree):
     interpolant, _ = build(kind, degree)

@@ -74,6 +74,7 @@ def test_filtered_derivatives_follow_a_sine():
         assert np.all(miss < tolerance), (k, miss / tolerance)
 
 
+@pytest.mark.slow
 def test_error_of_the_highest_derivative():
     """What the linear pieces cost where the input enters directly, and its remedy."""
     filter = BesselFilter(4, 20.0)

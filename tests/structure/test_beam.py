@@ -126,6 +126,7 @@ def test_stiffness_grows_with_the_section():
     assert_close(compliance[1, 1, 1], 1.25 / rigidity[2], rtol=1e-15)
 
 
+@pytest.mark.slow
 def test_gradient_jit_and_vmap():
     def stiffness(height, width, wall, length):
         beam = beam_of(height, width, wall, length)

@@ -48,6 +48,7 @@ def test_exponential_vector():
     assert_close(top, desired["tangent_max"], rtol=tol)
 
 
+@pytest.mark.slow
 @each_spring
 def test_inverse_and_slopes(spring):
     """Over fourteen decades of torsion: inverse, tangent, secant, odd symmetry."""
@@ -128,6 +129,7 @@ def test_soft_gap_becomes_the_sharp_one():
     assert_close(spring.torque(torsion), 1e5 * sharp, rtol=0, atol=1e5 * 1e-6)
 
 
+@pytest.mark.slow
 def test_table_meets_its_points_and_stays_monotone():
     spring = SPRINGS[1]
     assert_close(jax.vmap(spring.torque)(TABLE), spring.torques, rtol=1e-13)

@@ -170,6 +170,7 @@ def test_limited_potential_on_both_sides_of_its_switch(torsion, corners):
     assert_close(spring.potential(jnp.array(torsion)), work, rtol=1e-12)
 
 
+@pytest.mark.slow
 @each_spring
 def test_gradients(spring):
     # Away from zero hardening, where a central difference would leave the domain.
@@ -178,6 +179,7 @@ def test_gradients(spring):
     assert_gradient(lambda s, x: s.torsion(x), spring, spring.torque(TORSION), order=2)
 
 
+@pytest.mark.slow
 @each_spring
 def test_potential_gradient(spring):
     assert_gradient(lambda s, x: s.potential(x), spring, TORSION)
@@ -206,6 +208,7 @@ def test_limited_turns_into_cubic_far_below_a_sharp_limit():
     assert_close(limited.potential(torsion), cubic.potential(torsion), rtol=1e-11)
 
 
+@pytest.mark.slow
 @each_spring
 def test_extremes_are_finite(spring):
     sizes = jnp.array([0.0, 1e-300, 1e8])[:, None]
@@ -250,6 +253,7 @@ def test_jit_vmap_and_loop_agree(spring):
         assert_close(jax.jit(jax.vmap(law))(arguments), loop, rtol=1e-14)
 
 
+@pytest.mark.slow
 @each_spring
 def test_taylor_composition(spring):
     # Torsion moves as x + v t: the coefficients are those of the derivatives.

@@ -106,6 +106,7 @@ def test_edges_are_straight_and_within_limits():
     assert_close(slopes(path, middle), desired, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_repeated_waypoints():
     points = jnp.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]])
     plain = StraightPath(points, *LIMITS)
@@ -148,6 +149,7 @@ def test_path_to_joints():
     assert_close(traced(times), joints, rtol=1e-13, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_way_to_a_reference():
     """Path, inverse kinematics and filter: the whole way of figure 6.5."""
     assert Reference is SignalsReference

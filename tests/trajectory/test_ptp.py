@@ -209,6 +209,7 @@ def test_jit_vmap_loop():
     assert_close(mapped, loop, rtol=1e-13, atol=1e-300)
 
 
+@pytest.mark.slow
 def test_gradient():
     motion = three_axes()
     assert_gradient(lambda m: m.duration, motion, order=2)
