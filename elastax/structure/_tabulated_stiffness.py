@@ -56,10 +56,8 @@ class TabulatedStiffness(AbstractStiffness):
                 )
 
     def torque(self, torsion: Float[Array, "..."]) -> Float[Array, "..."]:
-        size = jnp.abs(torsion)
-        left, y, slope, second, third = _piece(self, size)
-        u = size - left
-        return jnp.sign(torsion) * (y + u * (slope + u * (second + u * third)))
+        # not by the sign: its derivative at zero would be lost
+        return torsion * self.secant(torsion)
 
     def torsion(self, torque: Float[Array, "..."]) -> Float[Array, "..."]:
         return invert(_solve, self, torque)

@@ -88,6 +88,15 @@ def test_stiffness_is_the_slope_and_potential_the_area(spring):
         assert_close(single.potential(jnp.array(end)), area, rtol=2e-8)
 
 
+@each_spring
+def test_slope_at_zero(spring):
+    """What a state of rest starts from: autodiff must see the stiffness there."""
+    zero = jnp.zeros(2)
+    slope = jax.jit(lambda: jax.jvp(spring.torque, (zero,), (jnp.ones(2),))[1])()
+    assert_close(slope, spring.stiffness(zero), rtol=1e-13)
+    assert np.all(np.asarray(slope) > 0)
+
+
 @pytest.mark.slow
 @each_spring
 def test_gradient(spring):
