@@ -67,7 +67,8 @@ class SwitchingResult(eqx.Module):
         event_modes: mode after each event, (capacity, modes).
         events: number of events.
         steps: number of steps, rejected ones and those cut off included.
-        completed: whether the end was reached within `max_steps` and the capacity.
+        completed: whether the end was reached within `max_steps` and the capacity;
+            if not, the last state stands at all later times.
     """
 
     times: Times
@@ -139,21 +140,26 @@ def simulate_switching(
         x1, error, dense, _, _ = solver.step(term, t0, t1, x, mode, start, True)
         return x1, error, dense
 
-    def located(t0, t1, dense, mode):
+    def located(t0, t1, dense, mode, crossed):
         """Time of the first event of a step, and which guards it hit."""
         inside = solver.interpolation_cls(t0=t0, t1=t1, **dense)
 
-        def halve(_, ends):
-            low, high = ends
+        def halve(search):
+            low, high, count = search
             middle = low + 0.5 * (high - low)
             below = jnp.any(system.guards(middle, inside.evaluate(middle), mode) < 0)
-            return jnp.where(below, low, middle), jnp.where(below, middle, high)
+            low, high = jnp.where(below, low, middle), jnp.where(below, middle, high)
+            return low, high, count + 1
 
-        _, t = jax.lax.fori_loop(0, _BISECTIONS, halve, (t0, t1))
+        # in a batch every case comes here: without an event no halving
+        enough = jnp.where(crossed, _BISECTIONS, 0)
+        _, t, _ = jax.lax.while_loop(lambda s: s[2] < enough, halve, (t0, t1, 0))
         return t, system.guards(t, inside.evaluate(t), mode) < 0
 
-    def event(carry: _Carry, t1, dense) -> _Carry:
-        t, hit = located(carry.t, t1, dense, carry.mode)
+    def event(carry: _Carry, t1, dense, crossing) -> _Carry:
+        t, hit = located(carry.t, t1, dense, carry.mode, jnp.any(crossing))
+        # the end of the step and the dense output there may differ by rounding
+        hit = jnp.where(jnp.any(hit), hit, crossing)
         x, _, _ = attempt(carry.t, t, carry.x, carry.mode)
         x, mode = system.switched(t, x, carry.mode, hit)
         return carry._replace(
@@ -179,12 +185,16 @@ def simulate_switching(
         grown = jnp.maximum(carry.step, tried * factor)  # a short last step says little
         step = jnp.minimum(jnp.where(last & good, grown, tried * factor), largest)
         carry = carry._replace(step=step, steps=carry.steps + 1)
-        crossed = good & jnp.any(system.guards(t1, x1, carry.mode) < 0)
+        crossing = good & (system.guards(t1, x1, carry.mode) < 0)
         x1 = system.accepted(t1, x1, carry.mode)
         onwards = carry._replace(
             t=jnp.where(good, t1, carry.t), x=jnp.where(good, x1, carry.x)
         )
-        return jax.lax.cond(crossed, lambda: event(carry, t1, dense), lambda: onwards)
+        return jax.lax.cond(
+            jnp.any(crossing),
+            lambda: event(carry, t1, dense, crossing),
+            lambda: onwards,
+        )
 
     def unfinished(end, carry: _Carry):
         allowed = (carry.steps < max_steps) & (carry.events < max_events)

@@ -1,9 +1,12 @@
 """Reference results of the Modelica Association: reading, comparing, drawing."""
 
+import argparse
 import csv
 import os
 import pathlib
+from collections.abc import Callable
 
+import jax
 import matplotlib
 
 
@@ -109,3 +112,15 @@ def draw(path: pathlib.Path, title: str, panels, times, end: float) -> None:
     figure.tight_layout()
     figure.savefig(path, dpi=110)
     plt.close(figure)
+
+
+def command_line(main: Callable, description: str | None) -> None:
+    """Run a script: `--out` for its figures, `--data` for the reference results."""
+    jax.config.update("jax_enable_x64", True)
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--out", type=pathlib.Path, help="folder of the figures")
+    parser.add_argument(
+        "--data", type=pathlib.Path, help="folder that holds `modelica_reference`"
+    )
+    given = parser.parse_args()
+    main(given.out, given.data)

@@ -5,7 +5,6 @@ parameters these are: 5 kg m^2, 20 kN m/rad, 50 N m s/rad, play of 45 degrees, r
 at 90 degrees.
 """
 
-import argparse
 import pathlib
 import sys
 
@@ -87,9 +86,4 @@ def main(
 
 
 if __name__ == "__main__":
-    jax.config.update("jax_enable_x64", True)
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=pathlib.Path, default=None)
-    parser.add_argument("--data", type=pathlib.Path, default=None)
-    given = parser.parse_args()
-    main(given.out, given.data)
+    reference.command_line(main, __doc__)

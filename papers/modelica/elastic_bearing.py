@@ -7,7 +7,6 @@ m/rad to the load and 100 kN m/rad with 5 N m s/rad under the housing, torque ri
 gear stands at a/3 + 2 h/3.
 """
 
-import argparse
 import pathlib
 import sys
 
@@ -99,9 +98,4 @@ def main(
 
 
 if __name__ == "__main__":
-    jax.config.update("jax_enable_x64", True)
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=pathlib.Path, default=None)
-    parser.add_argument("--data", type=pathlib.Path, default=None)
-    given = parser.parse_args()
-    main(given.out, given.data)
+    reference.command_line(main, __doc__)

@@ -5,11 +5,10 @@ parameters these are: inertias 1 and 1.5 kg m^2, ratio 2, both efficiencies 0.5,
 sinusoidal drive and a slowly falling load; in the second example a bearing with 0.5 to
 1 N m beside the gear. Of two elements that stick on one shaft the torques are not
 unique, as the library says itself; which of them counts as moving was read from the
-reference at both stops (the bearing pushes on forwards); the motion and all times
-follow from the laws.
+reference at both stops (the bearing pushes on forwards), and so was that a flag is
+dropped in a step of its own; the motion and all times follow from the laws.
 """
 
-import argparse
 import pathlib
 import sys
 
@@ -184,9 +183,4 @@ def main(
 
 
 if __name__ == "__main__":
-    jax.config.update("jax_enable_x64", True)
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=pathlib.Path, default=None)
-    parser.add_argument("--data", type=pathlib.Path, default=None)
-    given = parser.parse_args()
-    main(given.out, given.data)
+    reference.command_line(main, __doc__)

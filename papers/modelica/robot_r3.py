@@ -5,7 +5,6 @@ bearing friction, gears of axes 1 to 3 elastic, the others rigid (here very stif
 along the synchronous point-to-point motion of KinematicPTP2.
 """
 
-import argparse
 import pathlib
 import sys
 
@@ -167,9 +166,4 @@ def main(
 
 
 if __name__ == "__main__":
-    jax.config.update("jax_enable_x64", True)
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=pathlib.Path, default=None)
-    parser.add_argument("--data", type=pathlib.Path, default=None)
-    given = parser.parse_args()
-    main(given.out, given.data)
+    reference.command_line(main, __doc__)

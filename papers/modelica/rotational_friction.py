@@ -6,7 +6,6 @@ damper, inertia 1 with a brake (800 N m) that closes at 0.5 s, when the motor is
 switched off.
 """
 
-import argparse
 import pathlib
 import sys
 
@@ -93,15 +92,21 @@ def discrete(result) -> list[tuple[float, tuple]]:
     The library starts a motion in two steps: a flag while the contact still counts as
     stuck, then the mode; ours is one event.
     """
+
+    def starting(before, after):
+        """Mode shown and flags of a contact that starts to slide, if it does."""
+        if before == 0 and after != 0:
+            return 0, int(after < 0), int(after > 0)
+        return int(after), 0, 0
+
     found = [(0.0, (2, 0, 0, -1, 0, 0))]
     before = (2, -1)
     count = int(result.events)
     modes = np.asarray(result.event_modes)[:count]
     for t, (clutch, brake) in zip(np.asarray(result.event_times), modes.astype(int)):
-        if before[1] == 0 and clutch != 0:
-            flags = (int(clutch < 0), int(clutch > 0))
-            found.append((float(t), (int(brake), 0, 0, 0, *flags)))
-        found.append((float(t), (int(brake), 0, 0, int(clutch), 0, 0)))
+        first = (*starting(before[0], brake), *starting(before[1], clutch))
+        settled = (int(brake), 0, 0, int(clutch), 0, 0)
+        found += [(float(t), values) for values in dict.fromkeys((first, settled))]
         before = (int(brake), int(clutch))
     return found
 
@@ -179,9 +184,4 @@ def main(
 
 
 if __name__ == "__main__":
-    jax.config.update("jax_enable_x64", True)
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=pathlib.Path, default=None)
-    parser.add_argument("--data", type=pathlib.Path, default=None)
-    given = parser.parse_args()
-    main(given.out, given.data)
+    reference.command_line(main, __doc__)

@@ -120,6 +120,37 @@ def test_energy_is_never_made():
     assert abs(20.0 * x[-1, 0]) <= 2.5
 
 
+class Clutch(AbstractSwitchingSystem):
+    """Two free shafts, joined by a clutch: speeds; 1 or -1 sliding, 0 joined."""
+
+    contact: FrictionContact
+
+    def rates(self, t, x, mode):
+        torque = self.contact.torque(x[1] - x[0], mode[0], jnp.asarray(50.0))
+        return jnp.where(mode[0] == 0, 0.0, torque * jnp.array([1 / 2.0, -1 / 0.5]))
+
+    def guards(self, t, x, mode):
+        return (mode[0] * (x[1] - x[0]) + 1e-12 + 0.0 * t)[None]
+
+    def switched(self, t, x, mode, hit):
+        return x, jnp.zeros(1)
+
+    def accepted(self, t, x, mode):
+        return x
+
+
+def test_clutch_synchronises():
+    """Time of the slip over the torque and both inertias; momentum is kept."""
+    clutch = Clutch(FrictionContact([0.0], [0.4], 0.1, 1.0))
+    start = jnp.array([10.0, 90.0])
+    result = run(clutch, start, jnp.array([1.0]), jnp.linspace(0.0, 30.0, 61))
+    torque = 0.4 * 0.1 * 50.0
+    assert int(result.events) == 1
+    assert_close(result.event_times[0], 80.0 / (torque * (0.5 + 2.0)), rtol=1e-9)
+    together = (2.0 * 10.0 + 0.5 * 90.0) / 2.5
+    assert_close(result.x[-1], [together, together], rtol=1e-9)
+
+
 def test_batch_is_the_loop():
     speeds = jnp.array([0.5, 1.0, 3.0])
     starts = jnp.stack([0.0 * speeds, speeds], axis=1)
