@@ -120,6 +120,7 @@ def test_sizes_axes_derivatives_and_nesting():
         """)
 
 
+@pytest.mark.slow
 def test_linear_algebra_does_not_wait_for_ever():
     """Batched LAPACK calls on every device at once would hang in jaxlib 0.10."""
     run_on_two_devices(

@@ -133,6 +133,7 @@ def test_gallery_stretched_angle(gallery, robot):
     assert lengths[1] > max(lengths[0], lengths[2])
 
 
+@pytest.mark.slow
 def test_gallery_branches_hold_the_pose(gallery, robot):
     points, axes, angles, allowed = gallery.branches(robot)
     q = jax.vmap(robot.from_maker)(jnp.asarray(angles))

@@ -132,6 +132,7 @@ def test_rate_index_linear_concatenate():
     assert_series(joined, lambda t: jnp.stack([vector(t), other(t)]))
 
 
+@pytest.mark.slow
 def test_cross_product():
     vectors = load_vectors("A.2")[0]
     a, b = (jnp.array(vectors["inputs"][name]) for name in "ab")
@@ -163,6 +164,7 @@ def test_sine_and_cosine():
     assert_close(square.coefficients, one, rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_solve_positive():
     solution = solve_positive(series(positive), series(vector))
     assert_series(
@@ -174,6 +176,7 @@ def test_solve_positive():
     assert_close(plain, leading(solution), rtol=1e-13)
 
 
+@pytest.mark.slow
 def test_gradient():
     def function(a, b, x):
         x = from_derivatives(x)

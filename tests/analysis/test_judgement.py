@@ -84,6 +84,7 @@ def test_figures_of_a_decaying_error(robot):
     assert_close(figures.peak_gear_torque, [2.0], rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_settling_time(robot):
     """The tool stays within 0.1 mm of its final place from the known time on."""
     times = np.linspace(0.0, 2.0, 4001)

@@ -38,6 +38,7 @@ def edited(tmp_path, old: str, new: str) -> str:
     return str(file)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -148,6 +149,7 @@ def test_wrong_recording_file(capsys, tmp_path):
     assert "table.csv" in line
 
 
+@pytest.mark.slow
 def test_unreachable_path(capsys, tmp_path):
     file = tmp_path / "path.csv"
     file.write_text("5.0, 0.0, 1.0\n")

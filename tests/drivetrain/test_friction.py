@@ -116,6 +116,7 @@ def derivative_of(function, x):
     return jax.jvp(function, (x,), (jnp.ones_like(x),))[1]
 
 
+@pytest.mark.slow
 @each_law_slowly
 def test_gradient(law):
     assert_gradient(lambda f, v: f.torque(v), law, SPEED, order=2)

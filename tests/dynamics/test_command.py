@@ -3,6 +3,7 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from elastax.dynamics import CommandInterpolant, MotorCommand, MotorSample
 
 from tests import systems
@@ -37,6 +38,7 @@ def errors(dt: float) -> np.ndarray:
     )
 
 
+@pytest.mark.slow
 def test_order_of_the_interpolation():
     """Fourth order with known slopes, third with slopes by differences."""
     coarse, fine = errors(0.02), errors(0.01)

@@ -95,6 +95,7 @@ def test_tangents_against_the_factorised_matrix(name):
         assert_close(one, other, rtol=0, atol=1e-10 * scale)
 
 
+@pytest.mark.slow
 def test_gradient():
     robot = systems.elastic_2r()
     state, _, force = inputs(robot)

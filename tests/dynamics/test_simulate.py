@@ -38,6 +38,7 @@ def step_response(robot, torque, *, rtol=1e-8, **options):
 step_response_jit = eqx.filter_jit(step_response)
 
 
+@pytest.mark.slow
 def test_two_mass_oscillator():
     """Damped oscillation and the torque in the gear, to the solver's tolerance."""
     robot = systems.two_mass_oscillator(**MASSES)

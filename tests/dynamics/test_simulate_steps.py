@@ -29,6 +29,7 @@ def response(stiffness, *, rotor=1.5, damping=6.0, **options):
 STIFFNESS = jnp.array(MASSES["stiffness"])
 
 
+@pytest.mark.slow
 def test_constant_steps_cost_what_they_cost():
     """As many steps as asked for, and the closed form to the solver's fifth order."""
 
@@ -46,6 +47,7 @@ def test_constant_steps_cost_what_they_cost():
     assert_close(result.theta[:, 0], theta, rtol=0, atol=bound * np.abs(theta).max())
 
 
+@pytest.mark.slow
 def test_default_step_is_a_sample():
     """Within ten tolerances of a much finer run, with no more steps than samples."""
     motion = eqx.filter_jit(

@@ -72,6 +72,7 @@ def test_predicts_its_own_torque(robot, exact):
     assert_close(default, exact.motor_torque, rtol=1e-10, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_gradient_of_the_figure_of_merit(robot, exact):
     """Predictions are differentiable by the parameters of the robot."""
 

@@ -158,6 +158,7 @@ def test_streaming_is_offline(inverse, reference):
     )
 
 
+@pytest.mark.slow
 def test_without_structural_elasticity_asim_is_flexible_joint(reference):
     model = systems.elastic_2r().flexible_joint()
     asim = ASIM(PositionCorrection(axes=(0, 1)))

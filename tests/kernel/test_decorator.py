@@ -100,6 +100,7 @@ def effect(x):
     return 2.0 * x
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("definition", "args"),
     [

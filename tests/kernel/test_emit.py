@@ -86,6 +86,7 @@ ALONE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("function", ALONE.values(), ids=ALONE)
 def test_results_that_are_not_made(function):
     """XLA aborts the process if such results go through the fusion."""

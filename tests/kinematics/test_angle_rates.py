@@ -99,6 +99,7 @@ def test_angular_velocity_of_quaternions():
     assert_close(found, expected, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.slow
 @each_kind
 def test_motion_of_angles_inverts_the_angular_velocity(kind):
     _, matrix, rates = KINDS[kind]
@@ -148,6 +149,7 @@ def test_motion_needs_a_derivative():
         angular_velocity(rpy_rate_matrix, jnp.zeros((1, 3)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chain", [mixed(), kuka()], ids=["mixed", "kuka"])
 def test_analytic_jacobian_is_autodiff_of_the_angles(chain):
     q = jnp.asarray(np.random.default_rng(2).uniform(-1, 1, chain.number))

@@ -257,6 +257,7 @@ def test_whole_chains():
     assert [j.missing for j in convention_properties(scara()).joints] == [1, 1, 1, 0]
 
 
+@pytest.mark.slow
 def test_table_is_readable():
     text = str(convention_properties(to_mixed(planar(1.0, 0.7, 0.2))))
     lines = text.splitlines()

@@ -88,6 +88,7 @@ def coordinates(chain, rows=()):
     return jnp.asarray(rng.uniform(-1.5, 1.5, (*rows, chain.number)))
 
 
+@pytest.mark.slow
 @each_chain
 def test_pose_is_that_of_the_chain(chain):
     factors, q = elementary_chain(chain), coordinates(chain)

@@ -159,6 +159,7 @@ def test_gradient_of_all_branches():
     assert_gradient(function, joints.a, joints.d, pose)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "position",
     [[5.0, 0, 0], [0, 0, 1e8], [0.3, 0, 0.8], [0.26, 0, 0.79]],
@@ -205,6 +206,7 @@ def test_aligned_wrist_keeps_axis_4(bend):
     assert np.all(np.isfinite(gradient(pose)))
 
 
+@pytest.mark.slow
 def test_wrist_centre_on_axis_1_keeps_axis_1():
     chain = kuka(wrist_height=0.0)
     arm = SphericalWrist.from_chain(chain)
@@ -222,6 +224,7 @@ def test_wrist_centre_on_axis_1_keeps_axis_1():
     assert np.all(np.isfinite(gradient(pose)))
 
 
+@pytest.mark.slow
 def test_stretched_arm():
     chain = kuka()
     arm = SphericalWrist.from_chain(chain)

@@ -149,6 +149,7 @@ def test_series_are_nested_jvps(shape):
     assert_close(held, expected_held, rtol=1e-10, atol=1e-12 * scale)
 
 
+@pytest.mark.slow
 def test_limited_series_keeps_the_lowest_order():
     matrix = Series(jnp.zeros((3, 2, 2)).at[0].set(jnp.eye(2)))
     error = Series(jnp.ones((5, 2)))
@@ -194,6 +195,7 @@ def test_pose_is_reached(chain):
     assert int(still.steps) == 0
 
 
+@pytest.mark.slow
 def test_three_axes_reach_a_position():
     # axes 1 to 3 correct a deformed arm in position only, [Reiner2010] (3.54)
     chain = tilted()
@@ -206,6 +208,7 @@ def test_three_axes_reach_a_position():
     assert_close(solution.value[3:], POSE[3:], rtol=0.0)
 
 
+@pytest.mark.slow
 def test_limiter_bounds_every_step():
     chain, limiter = kuka(), CorrectionLimiter(-0.01, 0.01, 1e4)
     solution = solve_damped(

@@ -63,6 +63,7 @@ def test_gradient_of_the_difference():
     assert_gradient(function, jnp.array([0.5, -2.0, 1.0]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [PseudoInverseStep(), ErrorDampedStep()])
 def test_six_axes(step):
     chain = kuka()

@@ -110,6 +110,7 @@ def test_gradients(inverse):
         assert_close(slope, ARM.inverse_jacobian(q[k])[0], rtol=1e-13)
 
 
+@pytest.mark.slow
 @each_solution
 @pytest.mark.parametrize(
     "place",

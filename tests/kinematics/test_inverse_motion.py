@@ -173,6 +173,7 @@ def test_singular_poses(chain, pose):
         assert all(np.all(np.isfinite(s)) for s in slopes(q, twists[:2]))
 
 
+@pytest.mark.slow
 def test_little_damping_is_none():
     chain, q = fanuc(1e-3), Sines(3).derivatives()[:4].at[0].set(REGULAR)
     twists = tool_derivatives(chain, q).twists

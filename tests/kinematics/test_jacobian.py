@@ -27,6 +27,7 @@ def coordinates(chain, rows=()):
     return jnp.asarray(rng.uniform(-1.5, 1.5, (*rows, chain.number)))
 
 
+@pytest.mark.slow
 @each_chain
 def test_geometric_is_autodiff(chain):
     q = coordinates(chain)
@@ -113,6 +114,7 @@ def test_motion_is_the_derivative_of_the_pose():
     assert_close((velocity[:3], acceleration[:3]), expected, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_gradient_and_batches():
     chain = mixed()
     batch = coordinates(chain, (3,))

@@ -145,6 +145,7 @@ def test_elementary_product(name):
     assert_close(forward_kinematics(chain, Q), expected, rtol=1e-13, atol=1e-14)
 
 
+@pytest.mark.slow
 @each_convention
 def test_jacobian(name):
     chain = chain_of(name)

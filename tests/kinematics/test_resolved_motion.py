@@ -51,6 +51,7 @@ def test_derivatives_are_those_of_the_law():
     assert_close(actual[1:], expected, rtol=0, atol=1e-13 * np.max(np.abs(expected)))
 
 
+@pytest.mark.slow
 def test_without_damping_it_is_the_inverse():
     chain, q = fanuc(1e-3), Sines(3).derivatives()[:4].at[0].set(REGULAR)
     twists = tool_derivatives(chain, q).twists

@@ -38,6 +38,7 @@ def test_equal_to_lapack(shape):
     assert np.all(error <= 1e-14 * desired[:, 0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [(3, 3), (6, 3), (5, 6)], ids=str)
 def test_gradient(shape):
     # the first is generic: graded and equal ones have no slope to compare with
@@ -53,6 +54,7 @@ def test_gradient_is_finite_everywhere(shape):
     assert np.all(np.linalg.norm(slopes, axis=(-2, -1)) <= 1 + 1e-12)
 
 
+@pytest.mark.slow
 def test_one_at_a_time_equals_the_batch():
     found = matrices((3, 4), 230)
     batch = jax.jit(jax.vmap(singular_values))(found)

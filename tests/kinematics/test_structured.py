@@ -97,6 +97,7 @@ def test_frames_are_those_of_the_parameters():
         assert_close(function(one, q), function(other, q), rtol=1e-14, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_robot_is_that_of_the_parameters():
     """Inverse dynamics of the KR210 with all placements as parameters."""
     robot = kr210()

@@ -93,6 +93,7 @@ def test_gears_are_referred_to_the_output(robot):
     assert_close(friction, [0, 0, 0, 31.6, 30.13, 14.82], rtol=1e-14)
 
 
+@pytest.mark.slow
 def test_stiff_gears_stay_apart_from_the_elastic_ones(robot):
     find = eqx.filter_jit(locked_frequencies)
     for name, pose in robot.poses.items():

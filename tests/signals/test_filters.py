@@ -104,6 +104,7 @@ def test_states_hold_the_derivatives(filter):
     assert_close(slopes / scale, expected / scale, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.slow
 @each_filter
 def test_exact_for_piecewise_linear_input(filter):
     """Against scipy's first-order hold, on states of the size of the input."""

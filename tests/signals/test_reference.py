@@ -185,6 +185,7 @@ def test_wrong_derivatives_are_refused(spoil):
         Reference.from_derivatives(t, rows)
 
 
+@pytest.mark.slow
 def test_jit_and_vmap():
     filter = BesselFilter(3, 30.0)
     t, rows = sine(count=40)

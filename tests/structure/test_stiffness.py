@@ -187,6 +187,7 @@ def test_potential_gradient(spring):
     assert_close(torque, spring.torque(TORSION), rtol=1e-13)
 
 
+@pytest.mark.slow
 def test_cubic_inverse_is_smooth_at_zero_hardening():
     torque = jnp.array(700.0)
     soft = lambda gamma: CubicStiffness(2e5, gamma).torsion(torque)

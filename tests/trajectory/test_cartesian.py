@@ -120,6 +120,7 @@ def test_repeated_waypoints():
     assert_close(StraightPath(points[:1].repeat(2, 0), *LIMITS).duration, 0.0, rtol=0.0)
 
 
+@pytest.mark.slow
 def test_jit_vmap_loop_and_gradient():
     path = figure_path()
     t = jnp.array([0.1, 1.2, 2.0, 3.0])
@@ -129,6 +130,7 @@ def test_jit_vmap_loop_and_gradient():
     assert_gradient(run, path, jnp.asarray(1.3))
 
 
+@pytest.mark.slow
 def test_path_to_joints():
     path = figure_path()
     times = np.linspace(0.0, float(path.duration), 41)

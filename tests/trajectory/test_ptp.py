@@ -191,6 +191,7 @@ def test_no_move():
     assert np.all(np.isfinite(slope(jnp.array([0.0, 1e-300, 1e-80, 1e-12]))))
 
 
+@pytest.mark.slow
 def test_jit_vmap_loop():
     """All kinds of motion in one batch: zero, short, middle, long."""
     scale = jnp.array([0.0, 1e-4, 0.05, 1.0, 20.0])
