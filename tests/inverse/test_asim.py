@@ -177,7 +177,9 @@ def test_derivatives_against_nested_jvp(model):
 
     def by_series(model):
         state = asim.init(model, rows, dt)
-        state = eqx.tree_at(lambda s: (s.eta, s.drive.torsion), state, (eta, torsion))
+        state = eqx.tree_at(
+            lambda s: (s.eta, s.drive.gear.torsion), state, (eta, torsion)
+        )
         return asim.step(model, state, rows)[0]
 
     def by_jvp(model):
