@@ -33,9 +33,8 @@ class RateIndependentPlay(AbstractSmoothPlay):
       $-\ln(1 - e^{-\psi m})/\psi$, about $e^{-\psi m}/\psi$: the leak of the memory.
 
     Below $v_0$ the direction is uncertain and the output moves along one path in both:
-    a motion that stays this slow has no hysteresis. The operator is ours; peers smooth
-    the play by a delay, as the text does, or by Bouc's equation, whose corner is wider
-    and whose small cycles drift.
+    a motion that stays this slow has no hysteresis. The operator is ours; the text
+    smooths the play by a delay.
 
     Attributes:
         thresholds: $r_i > 0$, shape (plays, joints), in the unit of the input.
