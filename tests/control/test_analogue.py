@@ -41,11 +41,12 @@ def test_away_from_the_setpoint_only_the_integrator_moves():
 
 def test_current_loop_has_the_frequency_and_damping_of_its_motor():
     """Poles of voltage and current at a locked rotor: w^2 and 2 D w."""
-    matrix = jax.jacfwd(
-        lambda z: CONTROL.rates(SETPOINT, ANGLE, ZERO, jnp.stack([ZERO, z[0], z[1]]))[
-            1:
-        ]
-    )(jnp.zeros((2, 6)))
+
+    def rates(electric):
+        memory = jnp.concatenate([ZERO[None], electric])
+        return CONTROL.rates(SETPOINT, ANGLE, ZERO, memory)[1:]
+
+    matrix = jax.jacfwd(rates)(jnp.zeros((2, 6)))
     for k, (w, damping) in enumerate([(4590.0, 0.6), (5500.0, 0.6)]):
         block = np.asarray(matrix)[:, k, :, k]
         assert_close(-np.trace(block), 2 * damping * w, rtol=1e-12)
