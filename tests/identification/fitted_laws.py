@@ -131,6 +131,11 @@ CASES = {
     "breakaway": Case(
         lambda s: BreakawayFriction(12.5, 10.0, s, 11.0, max(0.2, 3.0 / s))
     ),
+    "breakaway within the crossing": Case(
+        # the bell is over before the crossing is: a minimum without a bell as well
+        lambda s: BreakawayFriction(12.5, 10.0, s, 11.0, 0.2 / s),
+        starts=8,
+    ),
     "piecewise": Case(
         lambda s: PiecewiseFriction(
             0.62, s, max(0.08, 4.0 / s), max(1.0, 8.0 / s), 1.0, 0.28 if s > 9 else 0.08
