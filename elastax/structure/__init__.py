@@ -1,4 +1,4 @@
-"""Elastic structure: spring laws, bearings and beams."""
+"""Elastic structure: spring laws, bearings, beams and modal bodies."""
 
 from ._axes import AxisStiffness as AxisStiffness
 from ._backlash_stiffness import BacklashStiffness as BacklashStiffness
@@ -12,7 +12,25 @@ from ._beam import (
     Material as Material,
     UniformBeam as UniformBeam,
 )
+from ._body_detail import (
+    NOMINAL as NOMINAL,
+    VARIANT_1 as VARIANT_1,
+    VARIANT_2 as VARIANT_2,
+    VARIANT_3 as VARIANT_3,
+    VARIANT_4 as VARIANT_4,
+    VARIANT_5 as VARIANT_5,
+    BodyDetail as BodyDetail,
+)
+from ._body_nodes import BodyNodes as BodyNodes, no_nodes as no_nodes
 from ._exponential_stiffness import ExponentialStiffness as ExponentialStiffness
+from ._floating_frame import (
+    BodyForces as BodyForces,
+    element_motion as element_motion,
+    free_body as free_body,
+    inertial_forces as inertial_forces,
+)
+from ._modal_body import ModalBody as ModalBody
+from ._point_masses import point_mass_body as point_mass_body
 from ._stiffness import (
     AbstractStiffness as AbstractStiffness,
     CubicStiffness as CubicStiffness,
