@@ -31,12 +31,14 @@ from ._equilibrium import (
 )
 from ._lagrange import lagrange_forces as lagrange_forces
 from ._linearised import body_accelerations as body_accelerations
+from ._modal_links import ModalLink as ModalLink
 from ._newton_euler import inverse_dynamics as inverse_dynamics
 from ._parts import (
     Axis as Axis,
     Body as Body,
     ElasticJoint as ElasticJoint,
     EndSlope as EndSlope,
+    FlexibleLink as FlexibleLink,
     Offset as Offset,
     Part as Part,
     WristCentre as WristCentre,
@@ -48,6 +50,7 @@ from ._robot import (
     ElasticRobot as ElasticRobot,
     ElasticRole as ElasticRole,
     JointLimits as JointLimits,
+    NodeRole as NodeRole,
     SlopeRole as SlopeRole,
 )
 from ._screws import multibody as multibody

@@ -10,6 +10,7 @@ from .._taylor import leading
 from ..drivetrain import GearMemory
 from ..kinematics import moving_frames
 from ._gear_loads import gear_loads, rigid_motor_load
+from ._modal_links import modal_energy, modal_weight
 from ._robot import ElasticRobot
 
 
@@ -27,6 +28,12 @@ def body_poses(
     return rotation, com
 
 
+def link_frames(robot: ElasticRobot, q: PerJoint, eta: PerElastic):
+    """Orientations and origins [m] of all links in the base frame."""
+    frames = moving_frames(robot.chain, robot.joint_coordinates(q, eta))
+    return leading(frames.rotation), leading(frames.position)
+
+
 def kinetic_energy(
     robot: ElasticRobot,
     q: PerJoint,
@@ -39,7 +46,8 @@ def kinetic_energy(
 
     $T = \tfrac12\sum_i (m_i \dot r_i^T \dot r_i + \omega_i^T \Theta_i \omega_i) +
     \tfrac12 \dot\theta^T \Theta \dot\theta$ with velocities by differentiation of the
-    positions and $\tilde\omega = R^T \dot R$. A robot with rigid gears takes
+    positions and $\tilde\omega = R^T \dot R$; flexible bodies add
+    $\tfrac12 z^T M z$ with their own velocities. A robot with rigid gears takes
     `thetad` = `qd`.
 
     References:
@@ -60,7 +68,15 @@ def kinetic_energy(
     )
     if not robot.has_elastic_gears:
         thetad = qd
-    return 0.5 * (
+    flexible = jnp.zeros((), qd.dtype)
+    if robot.modal_links:
+        (rotation, position), (turning, velocity_R) = jax.jvp(
+            lambda a, b: link_frames(robot, a, b), (q, eta), (qd, etad)
+        )
+        flexible = modal_energy(
+            robot, rotation, position, turning, velocity_R, eta, etad
+        )
+    return flexible + 0.5 * (
         jnp.sum(bodies.mass * jnp.sum(velocity**2, axis=1))
         + jnp.einsum("ka,kab,kb->", omega, bodies.inertia, omega)
         + jnp.sum(robot.drives.reflected_inertia() * thetad**2)
@@ -78,6 +94,8 @@ def potential_energy(
     """
     _, com = body_poses(robot, q, eta)
     energy = -jnp.sum(robot.all_bodies().mass * (com @ robot.gravity))
+    if robot.modal_links:
+        energy = energy + modal_weight(robot, *link_frames(robot, q, eta), eta)
     if robot.has_elastic_gears:
         energy = energy + gear_energy(robot, q, theta)
     if robot.structure_stiffness is not None:

@@ -4,7 +4,15 @@ import numpy as np
 
 from .._checks import is_concrete
 from ..kinematics import JointKind
-from ._robot import AxisRole, ElasticRobot, ElasticRole
+from ..structure import ModalBody
+from ._robot import (
+    AxisRole,
+    ElasticRobot,
+    ElasticRole,
+    JointRole,
+    NodeRole,
+    SlopeRole,
+)
 
 
 def check_inertia(robot: ElasticRobot) -> None:
@@ -49,32 +57,69 @@ def _mass_matrix(robot: ElasticRobot) -> np.ndarray:
         for name in ("mass", "com", "inertia")
     )
     carriers = np.array([joint for bodies in groups for joint in bodies.joint])
-    pose, screws, weights, total = np.asarray(robot.chain.base), [], [], 0.0
+    pose, moving, total = np.asarray(robot.chain.base), [], np.zeros((number, number))
     for joint, role in enumerate(robot.roles):
-        match role:
-            case AxisRole(index):
-                column, factor = index, 1.0
-            case ElasticRole(index):
-                column, factor = robot.axes + index, 1.0
-            case _:
-                column, factor = robot.axes + role.index, slopes[role.slope]
+        factors = _factors(role, robot.axes, slopes)
         pose = pose @ before[joint]
         direction = pose[:3, :3] @ axis[joint]
-        screws.append((pose[:3, 3], direction, robot.chain.kinds[joint]))
-        weights.append((column, factor))
-        pose = pose @ _motion(robot.chain.kinds[joint], axis[joint], values[column])
+        kind = robot.chain.kinds[joint]
+        moving.append((pose[:3, 3], direction, kind, factors))
+        value = sum(values[column] for column in factors)
+        pose = pose @ _motion(kind, axis[joint], value)
+        R = pose[:3, :3]
         for k in np.flatnonzero(carriers == joint):
-            centre = pose[:3, :3] @ com[k] + pose[:3, 3]
-            linear, angular = np.zeros((3, number)), np.zeros((3, number))
-            for (point, z, kind), (c, f) in zip(screws, weights):
-                rotary = kind is JointKind.REVOLUTE
-                linear[:, c] += f * (np.cross(z, centre - point) if rotary else z)
-                angular[:, c] += f * z * rotary
-            tensor = pose[:3, :3] @ inertia[k] @ pose[:3, :3].T
-            total = total + mass[k] * linear.T @ linear
-            total = total + angular.T @ tensor @ angular
+            linear, angular = _velocities(moving, R @ com[k] + pose[:3, 3], number)
+            tensor = R @ inertia[k] @ R.T
+            total += mass[k] * linear.T @ linear + angular.T @ tensor @ angular
+        for link in robot.modal_links:
+            if link.joint == joint:
+                linear, angular = _velocities(moving, pose[:3, 3], number)
+                modes = np.eye(number)[robot.axes + link.first :][: link.body.modes]
+                whole = np.concatenate([R.T @ linear, R.T @ angular, modes])
+                total += whole.T @ _body_mass(link.body) @ whole
         pose = pose @ after[joint]
-    return total + np.zeros((number, number))
+    return total
+
+
+def _factors(role: JointRole, axes: int, slopes: np.ndarray) -> dict[int, float]:
+    """Coordinates that move a joint, and by how much."""
+    match role:
+        case AxisRole(index):
+            return {index: 1.0}
+        case ElasticRole(index):
+            return {axes + index: 1.0}
+        case SlopeRole(index, slope):
+            return {axes + index: float(slopes[slope])}
+        case NodeRole(indices, weights):
+            return {
+                axes + index: float(slopes[weight])
+                for index, weight in zip(indices, weights)
+            }
+
+
+def _velocities(moving, point: np.ndarray, number: int):
+    """Velocity of a point and rotation by unit speeds, shape (3, coordinates) each."""
+    linear, angular = np.zeros((3, number)), np.zeros((3, number))
+    for origin, z, kind, factors in moving:
+        rotary = kind is JointKind.REVOLUTE
+        for column, factor in factors.items():
+            linear[:, column] += factor * (np.cross(z, point - origin) if rotary else z)
+            angular[:, column] += factor * z * rotary
+    return linear, angular
+
+
+def _body_mass(body: ModalBody) -> np.ndarray:
+    """Mass matrix of an undeformed flexible body, whatever its equations leave out."""
+    x, y, z = np.asarray(body.first_moment)
+    moment = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    C_t, C_r = np.asarray(body.C_t0), np.asarray(body.C_r0)
+    return np.block(
+        [
+            [float(body.mass) * np.eye(3), -moment, C_t.T],
+            [moment, np.asarray(body.J_0), C_r.T],
+            [C_t, C_r, np.asarray(body.M_e)],
+        ]
+    )
 
 
 def _motion(kind: JointKind, axis: np.ndarray, value: float) -> np.ndarray:

@@ -163,9 +163,7 @@ def _tangent(primals, tangents):
         missing = missing.at[:n].add(-rotor_rate * acceleration[:n])
     if any(rate is not None for rate in rates):
         rates = [jnp.zeros_like(x) if r is None else r for x, r in zip(state, rates)]
-        angles, speeds = jnp.concatenate(rates[:2]), jnp.concatenate(rates[2:])
-        change = force_tangents(robot, *state, acceleration)
-        missing = missing - change(angles, speeds)
+        missing = missing - _force_change(robot, state, acceleration, rates)
     if jax.tree.leaves(robot_rate):
         still, moving = eqx.partition(
             robot, jax.tree.map(lambda r: r is None, robot_rate, is_leaf=_is_none)
@@ -174,6 +172,17 @@ def _tangent(primals, tangents):
         forces = lambda r: forces_by_screws(eqx.combine(r, still), *state, *a)
         missing = missing - jax.jvp(forces, (moving,), (robot_rate,))[1]
     return acceleration, jax.scipy.linalg.cho_solve(factor, missing)
+
+
+def _force_change(robot, state, acceleration, rates):
+    """Change of the forces at fixed accelerations."""
+    if robot.modal_links:  # no closed form for the flexible bodies
+        n = robot.axes
+        a = acceleration[:n], acceleration[n:]
+        forces = lambda *state: forces_by_screws(robot, *state, *a)
+        return jax.jvp(forces, tuple(state), tuple(rates))[1]
+    angles, speeds = jnp.concatenate(rates[:2]), jnp.concatenate(rates[2:])
+    return force_tangents(robot, *state, acceleration)(angles, speeds)
 
 
 def _is_none(x) -> bool:

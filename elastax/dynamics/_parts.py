@@ -7,15 +7,18 @@ import numpy as np
 from .._custom_types import as_real
 from ..drivetrain import AbstractCounterbalance, DriveTrain
 from ..kinematics import SAME, JointKind, Placement, SerialChain, structured
-from ..structure import CubicStiffness, LinearStiffness
+from ..structure import CubicStiffness, LinearStiffness, ModalBody
 from ._bodies import RigidBodies, no_bodies
 from ._inertia import check_inertia
+from ._modal_links import ModalLink
+from ._mounting import mounted_body, node_motion
 from ._robot import (
     AxisRole,
     ElasticRobot,
     ElasticRole,
     JointLimits,
     JointRole,
+    NodeRole,
     SlopeRole,
 )
 
@@ -99,11 +102,37 @@ class Body:
 
 
 @dataclasses.dataclass(frozen=True)
+class FlexibleLink:
+    """Flexible body whose reference frame is the current frame, up to one of its nodes.
+
+    What follows stands in the frame of that node and moves with it.
+
+    Attributes:
+        name: of the link; its modes are elastic coordinates of the names
+            `name: mode`.
+        body: in modes with diagonal stiffness and damping, which do not move the
+            origin of the reference frame.
+        node: name of the node at which the following part is attached; `None` for a
+            body that ends the chain.
+        base: name of the node that lies in the origin of the current frame; unless
+            given, that is the origin of the body's own reference frame.
+
+    References:
+        [Reiner2010] sections 2.4.2 and 3.7.
+    """
+
+    name: str
+    body: ModalBody
+    node: str | None = None
+    base: str | None = None
+
+
+@dataclasses.dataclass(frozen=True)
 class WristCentre:
     """Marks the next axis as the one whose origin is the wrist centre."""
 
 
-Part = Offset | Axis | ElasticJoint | EndSlope | Body | WristCentre
+Part = Offset | Axis | ElasticJoint | EndSlope | Body | FlexibleLink | WristCentre
 
 
 def assemble(
@@ -142,12 +171,13 @@ def assemble(
 
     Raises:
         ValueError: no axis, an unknown hinge, elastic joints in line with an axis and
-            no inertia between them (the mass matrix is singular).
+            no inertia between them (the mass matrix is singular), a flexible body whose
+            modes move the place where it is attached.
     """
     joints, kinds, roles = [], [], []
     masses, coms, tensors, carriers, body_names = [], [], [], [], []
     springs, elastic_names, axis_names = [], [], []
-    hinge_axes, slopes = {}, []
+    hinge_axes, slopes, links = {}, [], []
     place = SAME
     wrist, mark = None, False
     for part in parts:
@@ -167,6 +197,37 @@ def assemble(
                 continue
             case WristCentre():
                 mark = True
+                continue
+            case FlexibleLink():
+                if not roles:
+                    raise ValueError(
+                        f"the flexible link `{part.name}` must have a joint in front "
+                        "of it: on the ground it moves nothing"
+                    )
+                first = len(elastic_names)
+                body = mounted_body(part.name, part.body, part.base, place)
+                links.append(ModalLink(body, len(roles) - 1, first))
+                elastic_names += [f"{part.name}: {mode}" for mode in body.mode_names]
+                springs += [
+                    (k, d, 0.0) for k, d in zip(np.diag(body.K_e), np.diag(body.D_e))
+                ]
+                if part.node is None:
+                    continue
+                turn = Placement(place.rotation, None, place.is_structure)
+                at, steps = node_motion(body, part.node)
+                place = Placement(np.eye(3), at)
+                for direction, kind, factors in steps:
+                    moving = tuple(np.flatnonzero(factors))
+                    number = len(slopes)
+                    weights = tuple(range(number, number + len(moving)))
+                    slopes += [factors[k] for k in moving]
+                    joints.append((place, (direction, True)))
+                    kinds.append(kind)
+                    roles.append(
+                        NodeRole(tuple(first + int(k) for k in moving), weights)
+                    )
+                    place = SAME
+                place = place.then(turn)
                 continue
             case Axis():
                 direction, kind = (0.0, 0.0, 1.0), part.kind
@@ -239,6 +300,7 @@ def assemble(
         elastic_names=tuple(elastic_names),
         sources=tuple(sources),
         assumptions=tuple(assumptions),
+        modal_links=tuple(links),
     )
     check_inertia(robot)
     return robot

@@ -25,6 +25,7 @@ import numpy as np
 
 from .._taylor import LEVI_CIVITA, concatenate, cross, leading, product, skew
 from ..kinematics import JointKind, joint_steps
+from ._modal_links import link_forces
 from ._robot import ElasticRobot
 
 
@@ -111,12 +112,16 @@ def generalised_forces(robot: ElasticRobot, q, eta, qd, etad, qdd, etadd):
     rotary = [kind is JointKind.REVOLUTE for kind in robot.chain.kinds]
 
     w, wd, a, spreading = None, None, -robot.gravity, None
+    separate = any(link.body.detail.separates_gravity for link in robot.modal_links)
+    weight = robot.gravity if separate else None
     wrenches: list[Any] = []
+    modal: list[Any] = []
     for k in range(robot.chain.number):
         lever = None
         if spreading is not None:
             lever = product("ab,b->a", spreading, offset[k])
         a = _turned(step[k], _sum(a, lever))
+        weight = _turned(step[k], weight)
         w, wd = _turned(step[k], w), _turned(step[k], wd)
         speed = product(",a->a", sd[k], axis[k])
         rate = _sum(product(",a->a", sdd[k], axis[k]), _crossed(w, speed))
@@ -127,6 +132,17 @@ def generalised_forces(robot: ElasticRobot, q, eta, qd, etad, qdd, etadd):
         spreading = _spreading(w, wd)
         link = links.get(k)
         wrenches.append((None, None) if link is None else _inertial(link, spreading, a))
+        for flexible in robot.modal_links:
+            if flexible.joint != k:
+                continue
+            turn, rate = (jnp.zeros((3,)) if x is None else x for x in (w, wd))
+            acting = link_forces(flexible, a, turn, rate, (eta, etad, etadd), weight)
+            wrenches[k] = (
+                _sum(wrenches[k][0], acting.force),
+                _sum(wrenches[k][1], acting.moment),
+            )
+            place = flexible.rows(robot.axes, robot.elastic, robot.gravity.dtype)
+            modal.append(product("kn,k->n", place, acting.modal))
 
     forces: list[Any] = []
     force = moment = None
@@ -141,4 +157,5 @@ def generalised_forces(robot: ElasticRobot, q, eta, qd, etad, qdd, etadd):
             force = product("ab,b->a", step[k], force)
             moment = product("ab,b->a", step[k], moment)
             moment = moment + cross(offset[k], force)
-    return product("jn,j->n", robot.coupling(), concatenate(forces[::-1]))
+    joints = product("jn,j->n", robot.coupling(), concatenate(forces[::-1]))
+    return _sum(joints, *modal)

@@ -15,6 +15,7 @@ from ..drivetrain import AbstractCounterbalance, DriveTrain
 from ..kinematics import Arm, DeformableArm, SerialChain
 from ..structure import AbstractStiffness
 from ._bodies import RigidBodies
+from ._modal_links import ModalLink, undeformed_bodies
 from ._reduce import locked_chain
 
 
@@ -40,7 +41,18 @@ class SlopeRole:
     slope: int
 
 
-JointRole = AxisRole | ElasticRole | SlopeRole
+@dataclasses.dataclass(frozen=True)
+class NodeRole:
+    """The joint is a direction in which a node of a modal body moves.
+
+    Its coordinate is the sum of the elastic coordinates `indices` times `slopes`.
+    """
+
+    indices: tuple[int, ...]
+    slopes: tuple[int, ...]
+
+
+JointRole = AxisRole | ElasticRole | SlopeRole | NodeRole
 
 
 class JointLimits(eqx.Module):
@@ -82,9 +94,10 @@ class ElasticRobot(eqx.Module):
         bodies: rigid bodies behind the joints.
         payload: bodies carried by the last link.
         flange: pose of the flange in the frame behind the last joint's motion [m].
-        slopes: end-slope factors, shape (slopes,).
+        slopes: end-slope factors and mode shapes at nodes, shape (slopes,).
         structure_stiffness: spring laws of the elastic coordinates.
-        structure_damping: damping of the elastic coordinates [N m s/rad].
+        structure_damping: damping of the elastic coordinates [N m s/rad]; those of
+            modal bodies are in the units of their modes.
         drives: one drive train per axis.
         counterbalance: acts on the axis `counterbalanced_axis`, or `None`.
         gravity: gravity vector in the base frame [m/s^2].
@@ -98,9 +111,10 @@ class ElasticRobot(eqx.Module):
         name, axis_names, elastic_names: for tables and messages.
         sources: where the numbers come from.
         assumptions: what was assumed, where no source gives a number.
+        modal_links: flexible bodies between the joints.
 
     References:
-        [Reiner2010] (2.38), sections 2.4.1, 2.4.3, 2.5.
+        [Reiner2010] (2.38), sections 2.4.1 to 2.4.3, 2.5, 3.7.
     """
 
     chain: SerialChain
@@ -125,6 +139,7 @@ class ElasticRobot(eqx.Module):
     elastic_names: tuple[str, ...] = eqx.field(static=True)
     sources: tuple[str, ...] = eqx.field(static=True, default=())
     assumptions: tuple[str, ...] = eqx.field(static=True, default=())
+    modal_links: tuple[ModalLink, ...] = ()
 
     def __check_init__(self):
         check_fields(self)
@@ -139,9 +154,9 @@ class ElasticRobot(eqx.Module):
                 f"{self.axes} axes, but {self.drives.number} drive trains"
             )
         check_values(
-            "`structure_damping` must be positive [N m s/rad]",
+            "`structure_damping` must not be negative [N m s/rad]",
             self.structure_damping,
-            self.structure_damping > 0,
+            self.structure_damping >= 0,
         )
 
     @property
@@ -152,7 +167,8 @@ class ElasticRobot(eqx.Module):
     @property
     def elastic(self) -> int:
         """Number of structural elastic coordinates $n_e$."""
-        return sum(isinstance(role, ElasticRole) for role in self.roles)
+        hinges = sum(isinstance(role, ElasticRole) for role in self.roles)
+        return hinges + sum(link.body.modes for link in self.modal_links)
 
     @property
     def has_elastic_gears(self) -> bool:
@@ -160,7 +176,7 @@ class ElasticRobot(eqx.Module):
         return self.drives.stiffness is not None
 
     def all_bodies(self) -> RigidBodies:
-        """Bodies of the robot and of its payload."""
+        """Rigid bodies of the robot and of its payload."""
         return self.bodies.joined(self.payload)
 
     def coupling(self) -> Float[Array, "joints coordinates"]:
@@ -177,6 +193,10 @@ class ElasticRobot(eqx.Module):
                     rows.append(joint)
                     columns.append(self.axes + index)
                     slopes.append(slope)
+                case NodeRole(indices, weights):
+                    rows += [joint] * len(indices)
+                    columns += [self.axes + index for index in indices]
+                    slopes += weights
         matrix = jnp.asarray(constant, self.gravity.dtype)
         if not rows:
             return matrix
@@ -274,7 +294,9 @@ def _without_structure(robot: ElasticRobot, drives: DriveTrain) -> ElasticRobot:
     return dataclasses.replace(
         robot,
         chain=chain,
-        bodies=robot.bodies.attached(placement),
+        bodies=robot.bodies.joined(undeformed_bodies(robot.modal_links)).attached(
+            placement
+        ),
         payload=robot.payload.attached(placement),
         flange=placement[1][-1] @ robot.flange,
         slopes=jnp.zeros((0,)),
@@ -284,4 +306,5 @@ def _without_structure(robot: ElasticRobot, drives: DriveTrain) -> ElasticRobot:
         roles=tuple(robot.roles[k] for k in keep),
         wrist=wrist,
         elastic_names=(),
+        modal_links=(),
     )

@@ -21,6 +21,7 @@ from .._custom_types import PerElastic, PerJoint
 from .._kernel import kernel
 from .._taylor import concatenate, cross, leading, product
 from ..kinematics import JointKind, MovingFrames, moving_frames
+from ._modal_links import base_forces, base_moments, modal_mass
 from ._robot import ElasticRobot
 
 
@@ -62,6 +63,12 @@ def _behind(robot: ElasticRobot, joint: tuple[int, ...]) -> np.ndarray:
     return (np.array(joint, int)[None, :] >= joints[:, None]).astype(float)
 
 
+def _carriers(robot: ElasticRobot) -> tuple[int, ...]:
+    """Joints of the rigid bodies and of the flexible ones."""
+    flexible = tuple(link.joint for link in robot.modal_links)
+    return robot.all_bodies().joint + flexible
+
+
 @kernel
 def forces_by_screws(robot: ElasticRobot, q, eta, qd, etad, qdd, etadd):
     """`generalised_forces` in the terms of `multibody`, as a sum of screws.
@@ -96,9 +103,15 @@ def forces_by_screws(robot: ElasticRobot, q, eta, qd, etad, qdd, etadd):
     moment = product("kab,kb->ka", rotation, moment_body) + cross(com, force)
 
     wrench = concatenate([force, moment], axis=1)
-    behind = jnp.asarray(_behind(robot, bodies.joint), leading(screws).dtype)
+    modal = None
+    if robot.modal_links:
+        flexible = base_forces(robot, frames, twist, acceleration, eta, etad, etadd)
+        wrench = concatenate([wrench, flexible.wrench])
+        modal = flexible.modal
+    behind = jnp.asarray(_behind(robot, _carriers(robot)), leading(screws).dtype)
     forces = product("ka,ka->k", screws, product("jk,ka->ja", behind, wrench))
-    return product("jn,j->n", robot.coupling(), forces)
+    joints = product("jn,j->n", robot.coupling(), forces)
+    return joints if modal is None else joints + modal
 
 
 class BodyTerms(NamedTuple):
@@ -152,9 +165,12 @@ def wrenches(robot: ElasticRobot, terms: BodyTerms, acceleration):
 
 
 def sum_behind(robot: ElasticRobot, values):
-    """Sums of the bodies' values over the bodies behind every joint, (joints, ...)."""
+    """Sums of the bodies' values over the bodies behind every joint, (joints, ...).
+
+    The flexible bodies follow the rigid ones where there are values of them.
+    """
     # outer bodies first, so that the sums have common beginnings
-    carriers = robot.all_bodies().joint
+    carriers = _carriers(robot)[: values.shape[0]]
     order = np.argsort(carriers, kind="stable")[::-1]
     joints = tuple(carriers[k] for k in order)
     behind = jnp.asarray(_behind(robot, joints), values.dtype)
@@ -195,13 +211,15 @@ def about_origin(terms: BodyTerms):
     return first, terms.tensor + trace[:, None, None] * identity - square
 
 
-def composites(robot: ElasticRobot, terms: BodyTerms) -> Composites:
+def composites(
+    robot: ElasticRobot, terms: BodyTerms, frames: MovingFrames, eta: PerElastic
+) -> Composites:
     """Bodies behind each joint as one."""
     first, inertia = about_origin(terms)
-    total = sum_behind(
-        robot,
-        jnp.concatenate([terms.mass[:, None], first, inertia.reshape(-1, 9)], axis=1),
-    )
+    rows = jnp.concatenate([terms.mass[:, None], first, inertia.reshape(-1, 9)], axis=1)
+    if robot.modal_links:
+        rows = jnp.concatenate([rows, base_moments(robot, frames, eta)])
+    total = sum_behind(robot, rows)
     return Composites(total[:, :1], total[:, 1:4], total[:, 4:].reshape(-1, 3, 3))
 
 
@@ -235,7 +253,14 @@ def multibody(
     sd = robot.joint_coordinates(qd, etad)
     twist, acceleration = chain_motion(robot, screws, sd, jnp.zeros_like(sd))
     terms = body_terms(robot, frames, twist)
-    wrench = sum_behind(robot, wrenches(robot, terms, acceleration))
-    momenta = composites(robot, terms).times(screws)
+    wrench = wrenches(robot, terms, acceleration)
+    momenta = composites(robot, terms, frames, eta).times(screws)
+    mass = mass_matrix(robot, screws, momenta)
+    if not robot.modal_links:
+        wrench = sum_behind(robot, wrench)
+        return mass, robot.coupling().T @ jnp.einsum("ka,ka->k", screws, wrench)
+    still = jnp.zeros_like(etad)
+    flexible = base_forces(robot, frames, twist, acceleration, eta, etad, still)
+    wrench = sum_behind(robot, jnp.concatenate([wrench, flexible.wrench]))
     bias = robot.coupling().T @ jnp.einsum("ka,ka->k", screws, wrench)
-    return mass_matrix(robot, screws, momenta), bias
+    return mass + modal_mass(robot, frames, screws, eta), bias + flexible.modal

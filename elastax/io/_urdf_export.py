@@ -7,7 +7,13 @@ import jax
 import numpy as np
 
 from .._rpy import rpy_of
-from ..dynamics import AxisRole, ElasticRobot, ElasticRole, RigidBodies
+from ..dynamics import (
+    AxisRole,
+    ElasticRobot,
+    ElasticRole,
+    RigidBodies,
+    SlopeRole,
+)
 from ..kinematics import Arm, JointKind, RPYJoints, SerialChain
 
 
@@ -66,7 +72,15 @@ def urdf_from_robot(robot: ElasticRobot, *, hinges: bool = False) -> str:
         hinges: whether elastic hinges are written too, as revolute joints without
             springs, each with a comment; joints at the end of a bending link mimic
             their hinge. Without, they are locked at zero.
+
+    Raises:
+        ValueError: hinges of a robot with modal bodies.
     """
+    if hinges and robot.modal_links:
+        raise ValueError(
+            f"`{robot.name}` has modal bodies, which a URDF cannot hold: write it "
+            "without hinges"
+        )
     robot = robot if hinges else robot.rigid()
     signs, zeros = np.asarray(robot.axis_signs), np.asarray(robot.axis_zeros)
     ends = np.sort(
@@ -86,7 +100,7 @@ def urdf_from_robot(robot: ElasticRobot, *, hinges: bool = False) -> str:
                 joints.append(_Written(robot.axis_names[k], range_, comment))
             case ElasticRole(k):
                 joints.append(_hinge(robot, k))
-            case _:
+            case SlopeRole():
                 of = robot.elastic_names[role.index]
                 factor = float(robot.slopes[role.slope])
                 name = f"end slope of {of}"

@@ -103,6 +103,21 @@ class BodyNodes(eqx.Module):
         slope = self.phi[index] + self.phi_1[index] @ eta
         return slope.T @ force + self.psi[index].T @ moment
 
+    def moved(self, rotation: Matrix3, position: Vector3) -> "BodyNodes":
+        """The nodes in another reference frame.
+
+        Args:
+            rotation, position: of the present frame in the new one.
+        """
+        turn = lambda x: jnp.einsum("ab,nb...->na...", rotation, x)
+        return BodyNodes(
+            turn(self.position) + position[None],
+            turn(self.phi),
+            turn(self.psi),
+            turn(self.phi_1),
+            self.names,
+        )
+
     def transformed(self, matrix: Float[Array, "modes new"]) -> "BodyNodes":
         """The nodes in other modal coordinates."""
         return BodyNodes(

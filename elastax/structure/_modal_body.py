@@ -210,6 +210,31 @@ class ModalBody(eqx.Module):
             mode_names=tuple(names),
         )
 
+    def moved(self, rotation, position) -> "ModalBody":
+        """The body in another reference frame that is fixed in the present one.
+
+        Args:
+            rotation: of the present frame in the new one, shape (3, 3).
+            position: of its origin in the new one, shape (3,) [m].
+        """
+        R, p = as_real(rotation), as_real(position)
+        turn = lambda x: jnp.einsum("ab,...b->...a", R, x)
+        turn2 = lambda x: jnp.einsum("ab,...bc,dc->...ad", R, x, R)
+        first = turn(self.first_moment)
+        C_t0, C_t1 = turn(self.C_t0), turn(self.C_t1)
+        return dataclasses.replace(
+            self,
+            first_moment=first + self.mass * p,
+            J_0=turn2(self.J_0) + pair(p, first) + 0.5 * self.mass * pair(p, p),
+            J_1=turn2(self.J_1) + pair(p, C_t0),
+            J_2=turn2(self.J_2) + pair(p, C_t1),
+            C_t0=C_t0,
+            C_t1=C_t1,
+            C_r0=turn(self.C_r0) + across(p, C_t0),
+            C_r1=turn(self.C_r1) + across(p, C_t1),
+            nodes=self.nodes.moved(R, p),
+        )
+
     def selected(self, modes) -> "ModalBody":
         """The body with only the modes of these indices, in this order."""
         modes = list(modes)
@@ -234,6 +259,20 @@ class ModalBody(eqx.Module):
 
 # O_e counts the products of the speeds in this order, (3.72b)
 SQUARES = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+
+
+def across(a, b):
+    """Cross products along the last axis."""
+    a, b = jnp.broadcast_arrays(jnp.expand_dims(a, range(b.ndim - a.ndim)), b)
+    return jnp.cross(a, b)
+
+
+def pair(a, b):
+    """Tensor $2\\,a \\cdot b\\,1 - a b^T - b a^T$, shape (..., 3, 3)."""
+    a, b = jnp.broadcast_arrays(jnp.expand_dims(a, range(b.ndim - a.ndim)), b)
+    dot = jnp.einsum("...,ab->...ab", jnp.sum(a * b, axis=-1), jnp.eye(3))
+    outer = a[..., :, None] * b[..., None, :]
+    return 2.0 * dot - outer - jnp.swapaxes(outer, -1, -2)
 
 
 def _in_squares(tensor):

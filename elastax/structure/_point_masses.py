@@ -9,7 +9,7 @@ import numpy as np
 
 from .._custom_types import as_real
 from ._body_nodes import BodyNodes
-from ._modal_body import ModalBody
+from ._modal_body import ModalBody, across, pair
 
 
 def point_mass_body(
@@ -62,21 +62,21 @@ def point_mass_body(
     modes = phi.shape[-1]
     shape = jnp.swapaxes(phi, 1, 2)  # (points, modes, 3)
     C_t0 = jnp.einsum("p,pka->ka", m, shape)
-    C_r0 = jnp.einsum("p,pka->ka", m, _across(c[:, None], shape))
+    C_r0 = jnp.einsum("p,pka->ka", m, across(c[:, None], shape))
     C_r1 = jnp.einsum(
-        "p,pkla->kla", m, _across(shape[:, None, :, :], shape[:, :, None, :])
+        "p,pkla->kla", m, across(shape[:, None, :, :], shape[:, :, None, :])
     )
     C_t1 = jnp.zeros((modes, modes, 3))
     M_e = jnp.einsum("p,pka,pla->kl", m, shape, shape)
-    J_0 = jnp.einsum("p,pab->ab", m, _pair(c, c)) * 0.5
-    J_1 = jnp.einsum("p,pkab->kab", m, _pair(c[:, None], shape))
-    J_2 = jnp.einsum("p,pklab->klab", m, _pair(shape[:, :, None], shape[:, None, :]))
+    J_0 = jnp.einsum("p,pab->ab", m, pair(c, c)) * 0.5
+    J_1 = jnp.einsum("p,pkab->kab", m, pair(c[:, None], shape))
+    J_2 = jnp.einsum("p,pklab->klab", m, pair(shape[:, :, None], shape[:, None, :]))
     if curvatures is not None:
         curved = jnp.moveaxis(as_real(curvatures), 1, -1)  # (points, modes, modes, 3)
         C_t1 = jnp.einsum("p,pkla->kla", m, curved)
-        lever = _across(c[:, None, None], curved)
+        lever = across(c[:, None, None], curved)
         C_r1 = C_r1 + jnp.einsum("p,pkla->kla", m, lever)
-        bent = _pair(c[:, None, None], curved)
+        bent = pair(c[:, None, None], curved)
         J_2 = J_2 + jnp.einsum("p,pklab->klab", m, bent)
     if discs is not None and rotations is not None:
         disc, turn = as_real(discs), jnp.swapaxes(as_real(rotations), 1, 2)
@@ -84,7 +84,7 @@ def point_mass_body(
         spin = jnp.einsum("pab,pkb->pka", disc, turn)
         C_r0 = C_r0 + jnp.sum(spin, axis=0)
         M_e = M_e + jnp.einsum("pka,pla->kl", turn, spin)
-        tilted = _across(turn[:, :, None], jnp.swapaxes(disc, 1, 2)[:, None])
+        tilted = across(turn[:, :, None], jnp.swapaxes(disc, 1, 2)[:, None])
         tilted = jnp.sum(jnp.swapaxes(tilted, 2, 3), axis=0)  # skew(psi_k) Theta
         J_1 = J_1 + tilted + jnp.swapaxes(tilted, 1, 2)
     return ModalBody(
@@ -104,17 +104,3 @@ def point_mass_body(
         mode_names=mode_names,
         name=name,
     )
-
-
-def _across(a, b):
-    """Cross products along the last axis."""
-    a, b = jnp.broadcast_arrays(a, b)
-    return jnp.cross(a, b)
-
-
-def _pair(a, b):
-    """Tensor $2\\,a \\cdot b\\,1 - a b^T - b a^T$, shape (..., 3, 3)."""
-    a, b = jnp.broadcast_arrays(a, b)
-    dot = jnp.einsum("...,ab->...ab", jnp.sum(a * b, axis=-1), jnp.eye(3))
-    outer = a[..., :, None] * b[..., None, :]
-    return 2.0 * dot - outer - jnp.swapaxes(outer, -1, -2)
