@@ -179,10 +179,13 @@ def _force_change(robot, state, acceleration, rates):
     if robot.modal_links:  # no closed form for the flexible bodies
         n = robot.axes
         a = acceleration[:n], acceleration[n:]
-        forces = lambda *state: forces_by_screws(robot, *state, *a)
+        forces = lambda q, eta, qd, etad: forces_by_screws(
+            robot, q, eta, qd, etad, *a
+        )
         return jax.jvp(forces, tuple(state), tuple(rates))[1]
     angles, speeds = jnp.concatenate(rates[:2]), jnp.concatenate(rates[2:])
-    return force_tangents(robot, *state, acceleration)(angles, speeds)
+    q, eta, qd, etad = state
+    return force_tangents(robot, q, eta, qd, etad, acceleration)(angles, speeds)
 
 
 def _is_none(x) -> bool:

@@ -20,6 +20,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._checks import check_values
 from .._custom_types import PerElastic, Scalar
 from .._kernel import kernel
 from .._taylor import Series, from_derivatives
@@ -82,6 +83,7 @@ class ASIM(AbstractInverse):
     def init(
         self, model: ElasticRobot, sample: Derivatives, dt: Scalar | float
     ) -> _State:
+        _check_damped(model)
         forcing = structure_torque(model, sample)
         eta = resting_deformation(model, forcing)
         dt = jnp.asarray(dt, sample.dtype)
@@ -117,6 +119,7 @@ class ASIM(AbstractInverse):
 
     def feedforward(self, model: ElasticRobot, reference: Reference) -> MotorCommand:
         check_reference(self, model, reference)
+        _check_damped(model)
         gear_spring(model.drives)
         samples, dt = samples_of(self, model, reference), reference.dt
         forcing = jax.vmap(lambda s: structure_torque(model, s).coefficients)(samples)
@@ -151,6 +154,15 @@ class ASIM(AbstractInverse):
 
 
 @kernel
+def _check_damped(model: ElasticRobot) -> None:
+    check_values(
+        "the deformations of ASIM need damping: `structure_damping` of "
+        f"`{model.name}` must be positive",
+        model.structure_damping,
+        model.structure_damping > 0,
+    )
+
+
 def _jacobian(correction: AbstractCorrection, model: ElasticRobot, q, eta):
     return correction.linearised(model, q, eta, correction.target(model, q))[0]
 

@@ -157,8 +157,8 @@ REFUSALS = {
         "one drive train per axis",
     ),
     "structural damping": (
-        lambda: assembled([Axis("A1"), LUMP, ElasticJoint("h", Y, 1.0, 0.0)]),
-        "`structure_damping` must be positive",
+        lambda: assembled([Axis("A1"), LUMP, ElasticJoint("h", Y, 1.0, -1.0)]),
+        "`structure_damping` must not be negative",
     ),
     "stiffness": (
         lambda: assembled([Axis("A1"), LUMP, ElasticJoint("h", Y, -1.0, 1.0)]),
