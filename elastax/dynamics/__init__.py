@@ -1,5 +1,9 @@
 """Elastic robots: assembly, energies, equations of motion, simulation."""
 
+from ._beam_parts import (
+    clamped_beam_parts as clamped_beam_parts,
+    segmented_beam_parts as segmented_beam_parts,
+)
 from ._block_form import (
     EquationsOfMotion as EquationsOfMotion,
     equations_of_motion as equations_of_motion,

@@ -179,9 +179,7 @@ def _force_change(robot, state, acceleration, rates):
     if robot.modal_links:  # no closed form for the flexible bodies
         n = robot.axes
         a = acceleration[:n], acceleration[n:]
-        forces = lambda q, eta, qd, etad: forces_by_screws(
-            robot, q, eta, qd, etad, *a
-        )
+        forces = lambda q, eta, qd, etad: forces_by_screws(robot, q, eta, qd, etad, *a)
         return jax.jvp(forces, tuple(state), tuple(rates))[1]
     angles, speeds = jnp.concatenate(rates[:2]), jnp.concatenate(rates[2:])
     q, eta, qd, etad = state

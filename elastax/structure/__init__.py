@@ -12,6 +12,7 @@ from ._beam import (
     Material as Material,
     UniformBeam as UniformBeam,
 )
+from ._beam_segments import BeamSegments as BeamSegments, SlenderBody as SlenderBody
 from ._body_detail import (
     NOMINAL as NOMINAL,
     VARIANT_1 as VARIANT_1,
@@ -29,6 +30,7 @@ from ._floating_frame import (
     free_body as free_body,
     inertial_forces as inertial_forces,
 )
+from ._hinged_beam import ClampHinges as ClampHinges, GaussHinges as GaussHinges
 from ._modal_body import ModalBody as ModalBody
 from ._point_masses import point_mass_body as point_mass_body
 from ._stiffness import (

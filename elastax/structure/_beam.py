@@ -20,6 +20,9 @@ from .._custom_types import Scalar, as_real
 class LoadCase(NamedTuple):
     r"""Static load for which a hinge at the clamp reproduces the tip exactly.
 
+    A moment at the tip turns the dependent hinge as well: by virtual work it counts
+    $1 + \gamma_\varphi$ times at the hinge.
+
     Attributes:
         stiffness_factor: hinge stiffness over $EI/l$, from the tip deflection.
         slope_factor: $\gamma_\varphi$, the angle of the dependent hinge at the tip over
@@ -31,7 +34,7 @@ class LoadCase(NamedTuple):
 
 
 TIP_FORCE = LoadCase(3.0, 1.0 / 2.0)
-TIP_MOMENT = LoadCase(2.0, 1.0)
+TIP_MOMENT = LoadCase(4.0, 1.0)
 UNIFORM_LOAD = LoadCase(4.0, 1.0 / 3.0)
 
 # [Reiner2010] (2.23a): position of the outer hinges over the length. It is the abscissa
