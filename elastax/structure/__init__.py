@@ -2,6 +2,12 @@
 
 from ._axes import AxisStiffness as AxisStiffness
 from ._backlash_stiffness import BacklashStiffness as BacklashStiffness
+from ._bar_modes import (
+    BarModes as BarModes,
+    bar_modes as bar_modes,
+    extension_modes as extension_modes,
+    torsion_modes as torsion_modes,
+)
 from ._beam import (
     HINGE_POSITION as HINGE_POSITION,
     TIP_FORCE as TIP_FORCE,
@@ -12,7 +18,22 @@ from ._beam import (
     Material as Material,
     UniformBeam as UniformBeam,
 )
+from ._beam_body import (
+    ModeCounts as ModeCounts,
+    TipMass as TipMass,
+    modal_beam as modal_beam,
+)
 from ._beam_segments import BeamSegments as BeamSegments, SlenderBody as SlenderBody
+from ._beam_supports import (
+    AbstractSupport as AbstractSupport,
+    ClampedFree as ClampedFree,
+    FreeFree as FreeFree,
+    SupportedFree as SupportedFree,
+)
+from ._bending_modes import (
+    BendingModes as BendingModes,
+    bending_modes as bending_modes,
+)
 from ._body_detail import (
     NOMINAL as NOMINAL,
     VARIANT_1 as VARIANT_1,

@@ -1,0 +1,253 @@
+r"""Modal bodies of uniform beams: bending in two planes, torsion, extension.
+
+The reference frame stands at the base of the beam with x along it. Bending in the x-y
+plane turns the cross sections about z, bending in the x-z plane about -y. The
+eigenfunctions are those of Rayleigh's or Euler and Bernoulli's beam; all integrals
+along it are Gauss-Legendre sums.
+"""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._checks import check_fields, check_values
+from .._custom_types import Scalar, as_real
+from ._bar_modes import extension_modes, torsion_modes
+from ._beam import UniformBeam
+from ._beam_supports import AbstractSupport, ClampedFree
+from ._bending_modes import bending_modes
+from ._body_nodes import BodyNodes
+from ._modal_body import ModalBody
+from ._point_masses import point_mass_body
+
+
+class TipMass(eqx.Module):
+    r"""Mass at the end of a beam, which shapes its modes.
+
+    Attributes:
+        mass: [kg].
+        inertia: moments about x, y, z through the end of the beam, shape (3,)
+            [kg m^2].
+        belongs: whether it is part of the modal body. If not it only shapes the modes,
+            and the robot has a body of its own there.
+
+    Raises:
+        ValueError: a value is negative.
+    """
+
+    mass: Scalar = eqx.field(converter=as_real)
+    inertia: Float[Array, "3"] = eqx.field(converter=as_real)
+    belongs: bool = eqx.field(static=True, default=True)
+
+    def __check_init__(self):
+        check_fields(self)
+        for name in ("mass", "inertia"):
+            value = getattr(self, name)
+            check_values(f"`{name}` must not be negative", value, value >= 0)
+
+
+class ModeCounts(eqx.Module):
+    """How many modes of each kind a beam has.
+
+    Attributes:
+        bending_xy: in the x-y plane, cross sections turn about z.
+        bending_xz: in the x-z plane.
+        torsion: about x.
+        extension: along x.
+
+    Raises:
+        ValueError: a number is negative, or all are zero.
+    """
+
+    bending_xy: int = eqx.field(static=True, default=0)
+    bending_xz: int = eqx.field(static=True, default=0)
+    torsion: int = eqx.field(static=True, default=0)
+    extension: int = eqx.field(static=True, default=0)
+
+    def __check_init__(self):
+        counts = (self.bending_xy, self.bending_xz, self.torsion, self.extension)
+        if min(counts) < 0 or not any(counts):
+            raise ValueError(f"a beam needs at least one mode, not {counts}")
+
+
+def modal_beam(
+    beam: UniformBeam,
+    counts: ModeCounts,
+    *,
+    support: AbstractSupport = ClampedFree(),
+    tip: TipMass | None = None,
+    rotary_inertia: bool = True,
+    damping_ratio=0.0,
+    nodes: Sequence[float] = (),
+    name: str = "beam",
+) -> ModalBody:
+    r"""Beam in its own eigenmodes, $M_e = 1$ and $K_e = \mathrm{diag}(\omega^2)$.
+
+    The second-order displacement is the shortening of a bent beam that keeps the length
+    of its axis, $u_x = -\tfrac12\int_0^x (v'^2 + w'^2)\,dx$, the source of geometric
+    stiffening. What torsion and bending do to each other in second order is left out,
+    and so is the rotary inertia's share of it.
+
+    Args:
+        beam: material, section and length.
+        counts: numbers of modes.
+        support: of the base, for bending; torsion and extension are held there unless
+            it is free.
+        tip: mass at the end.
+        rotary_inertia: whether the cross sections have inertia (Rayleigh) or not
+            (Euler and Bernoulli); about x they always do.
+        damping_ratio: $\zeta$ of all modes, or one per mode.
+        nodes: further nodes besides `base` and `tip`, as fractions of the length.
+        name: of the body.
+
+    Raises:
+        ValueError: a fraction outside (0, 1), or a mode count that is refused.
+
+    References:
+        [Reiner2010] section 2.4.2 and (2.21).
+    """
+    places = np.array([*sorted(nodes)], float)
+    if np.any((places <= 0.0) | (places >= 1.0)):
+        raise ValueError(f"`nodes` must lie within (0, 1) of the length, not {nodes}")
+    ratio = as_real(damping_ratio)
+    check_values("`damping_ratio` must not be negative", ratio, ratio >= 0)
+    length, density = beam.length, beam.material.density
+    section, young = beam.section, beam.material.young
+    mu = density * section.area
+    I_y, I_z = section.second_moment_y, section.second_moment_z
+    zero = jnp.zeros_like(length)
+    weight, inertia = (zero, jnp.zeros(3)) if tip is None else (tip.mass, tip.inertia)
+
+    def bending(number, I, turning):
+        return bending_modes(
+            young * I,
+            mu,
+            length,
+            number,
+            support=support,
+            rotary_inertia=density * I if rotary_inertia else zero,
+            tip_mass=weight,
+            tip_inertia=turning,
+        )
+
+    families = [
+        (counts.bending_xy, "xy", lambda n: bending(n, I_z, inertia[2])),
+        (counts.bending_xz, "xz", lambda n: bending(n, I_y, inertia[1])),
+        (
+            counts.torsion,
+            "torsion",
+            lambda n: torsion_modes(beam, n, support=support, tip_inertia=inertia[0]),
+        ),
+        (
+            counts.extension,
+            "extension",
+            lambda n: extension_modes(beam, n, support=support, tip_mass=weight),
+        ),
+    ]
+    abscissas, weights = _gauss(20 + 8 * max(n for n, _, _ in families))
+    whole = jnp.asarray(np.concatenate([abscissas, [0.0], places, [1.0]])) * length
+    squares, shapes, turns, slopes, labels = [], [], [], [], []
+    for number, label, modes_of in families:
+        if not number:
+            continue
+        modes = modes_of(number)
+        squares.append(modes.frequencies**2)
+        labels += [f"{label} {k + 1}" for k in range(number)]
+        shape, turn, slope = _fields(label, modes, whole)
+        shapes.append(shape)
+        turns.append(turn)
+        slopes.append(slope)
+    phi = jnp.concatenate(shapes, axis=2)
+    psi = jnp.concatenate(turns, axis=2)
+    slope = jnp.concatenate(slopes, axis=2)
+    curved = _shortening(slope, _antiderivative(abscissas, places), length)
+    count = len(abscissas)
+    weights = jnp.asarray(weights)
+    masses = mu * length * weights
+    positions = whole[:, None] * jnp.array([[1.0, 0.0, 0.0]])
+    bent = (I_y, I_z) if rotary_inertia else (zero, zero)
+    polar = jnp.stack([I_y + I_z, *bent])
+    spread = jnp.diag(density * polar * length)
+    discs = weights[:, None, None] * spread[None]
+    pick = lambda x: x[:count]
+    if tip is not None and tip.belongs:
+        masses = jnp.concatenate([masses, weight[None]])
+        discs = jnp.concatenate([discs, jnp.diag(inertia)[None]])
+        pick = lambda x: jnp.concatenate([x[:count], x[-1:]])
+    stiffness = jnp.concatenate(squares)
+    names = ("base", *(f"{place:g} l" for place in places), "tip")
+    body = point_mass_body(
+        masses,
+        pick(positions),
+        pick(phi),
+        jnp.diag(stiffness),
+        curvatures=pick(curved),
+        discs=discs,
+        rotations=pick(psi),
+        nodes=BodyNodes(
+            positions[count:], phi[count:], psi[count:], curved[count:], names
+        ),
+        mode_names=tuple(labels),
+        name=name,
+    )
+    damping = jnp.diag(2.0 * ratio * jnp.sqrt(stiffness))
+    return eqx.tree_at(lambda body: body.D_e, body, damping)
+
+
+def _fields(label: str, modes, x):
+    """Displacements, rotations (points, 3, modes) and slopes (points, 2, modes)."""
+    value, slope = modes.value(x).T, modes.slope(x).T
+    zero = jnp.zeros_like(value)
+    along = lambda *rows: jnp.stack(rows, axis=1)
+    straight = along(zero, zero)
+    match label:
+        case "xy":
+            shape, turn = along(zero, value, zero), along(zero, zero, slope)
+            return shape, turn, along(slope, zero)
+        case "xz":
+            shape, turn = along(zero, zero, value), along(zero, -slope, zero)
+            return shape, turn, along(zero, slope)
+        case "torsion":
+            return along(zero, zero, zero), along(value, zero, zero), straight
+        case _:
+            return along(value, zero, zero), along(zero, zero, zero), straight
+
+
+def _shortening(slope, antiderivative, length):
+    """Second-order displacements along x, shape (points, 3, modes, modes)."""
+    count = antiderivative.shape[1]
+    products = jnp.einsum("pik,pil->pkl", slope[:count], slope[:count])
+    integrals = jnp.einsum("qp,pkl->qkl", jnp.asarray(antiderivative), products)
+    total = -length * integrals
+    zero = jnp.zeros_like(total)
+    return jnp.stack([total, zero, zero], axis=1)
+
+
+def _gauss(number: int):
+    """Abscissas and weights of Gauss-Legendre quadrature on (0, 1)."""
+    nodes, weights = np.polynomial.legendre.leggauss(number)
+    return 0.5 * (nodes + 1.0), 0.5 * weights
+
+
+def _antiderivative(abscissas, places) -> np.ndarray:
+    """Integrals from 0 to all points of what is known at the abscissas, (points, n).
+
+    By the expansion in Legendre polynomials that has the values at the abscissas.
+    """
+    nodes = 2.0 * np.asarray(abscissas) - 1.0
+    number = len(nodes)
+    ends = np.concatenate([nodes, [-1.0], 2.0 * places - 1.0, [1.0]])
+    weights = np.polynomial.legendre.leggauss(number)[1]
+    legendre = np.polynomial.legendre
+    degree = np.arange(number)
+    coefficients = (degree[:, None] + 0.5) * legendre.legvander(nodes, number - 1).T
+    coefficients = coefficients * weights[None]
+    # the integral of P_n is (P_{n+1} - P_{n-1})/(2 n + 1), that of P_0 is x + 1
+    values = legendre.legvander(ends, number)
+    integrals = np.empty((len(ends), number))
+    integrals[:, 0] = ends + 1.0
+    integrals[:, 1:] = (values[:, 2:] - values[:, :-2]) / (2.0 * degree[1:] + 1.0)
+    return 0.5 * integrals @ coefficients
