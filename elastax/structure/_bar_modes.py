@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._checks import check_values
-from .._custom_types import as_real
+from .._custom_types import Scalar, as_real
 from ._beam import UniformBeam
 from ._beam_supports import AbstractSupport, ClampedFree
 
@@ -56,7 +56,7 @@ def bar_modes(
     number: int,
     *,
     support: AbstractSupport = ClampedFree(),
-    tip=0.0,
+    tip: Scalar | float = 0.0,
 ) -> BarModes:
     r"""The first eigenmodes of a uniform bar.
 
@@ -119,7 +119,7 @@ def torsion_modes(
     number: int,
     *,
     support: AbstractSupport = ClampedFree(),
-    tip_inertia=0.0,
+    tip_inertia: Scalar | float = 0.0,
 ) -> BarModes:
     """Modes of a beam in torsion; its polar inertia is that of the section."""
     section, material = beam.section, beam.material
@@ -139,7 +139,7 @@ def extension_modes(
     number: int,
     *,
     support: AbstractSupport = ClampedFree(),
-    tip_mass=0.0,
+    tip_mass: Scalar | float = 0.0,
 ) -> BarModes:
     """Modes of a beam along its axis."""
     section, material = beam.section, beam.material

@@ -71,9 +71,9 @@ def bending_modes(
     number: int,
     *,
     support: AbstractSupport = ClampedFree(),
-    rotary_inertia=0.0,
-    tip_mass=0.0,
-    tip_inertia=0.0,
+    rotary_inertia: Scalar | float = 0.0,
+    tip_mass: Scalar | float = 0.0,
+    tip_inertia: Scalar | float = 0.0,
 ) -> BendingModes:
     r"""The first eigenmodes of a uniform beam in one plane.
 
