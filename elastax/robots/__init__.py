@@ -1,5 +1,13 @@
 """Robots: functions that return records, every number with its source."""
 
+from ._arm_structure import (
+    AbstractArmStructure as AbstractArmStructure,
+    BodiesArm as BodiesArm,
+    HingedArm as HingedArm,
+    LumpedArm as LumpedArm,
+    ModalArm as ModalArm,
+    TiltedArm as TiltedArm,
+)
 from ._fanuc import fanuc as fanuc
 from ._iiwa14 import iiwa14 as iiwa14
 from ._kr16 import kr16 as kr16

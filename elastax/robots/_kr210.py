@@ -4,10 +4,11 @@ import numpy as np
 
 from ..dynamics import Body, ElasticRobot, JointLimits, Offset, assemble
 from . import _quantec as quantec
+from ._arm_structure import AbstractArmStructure, HingedArm
 from ._kuka_arm import arm_parts
 
 
-def kr210() -> ElasticRobot:
+def kr210(structure: AbstractArmStructure = HingedArm()) -> ElasticRobot:
     """KUKA KR210, 2.7 m reach, with a dumb-bell of 210 kg.
 
     Bodies from a public MATLAB model of a KR210 used for milling (values from CAD),
@@ -17,6 +18,13 @@ def kr210() -> ElasticRobot:
 
     The joint angles are KUKA's: zero is the stretched arm, A1 turns about -z, positive
     A2 and A3 lower the arm.
+
+    Args:
+        structure: how the link arm and the arm bend; at every detail the undeformed
+            robot is the same.
+
+    Examples:
+        >>> robot = kr210(ModalArm(ModeCounts(2, 2, 1)))
     """
     right = np.pi / 2
     # theta, d, a, alpha [rad, m]; base height .2256 in front
@@ -43,6 +51,7 @@ def kr210() -> ElasticRobot:
             forearm=quantec.forearm_section(),
             material=quantec.CAST_IRON,
             damping_time=quantec.STRUCTURE_DAMPING,
+            structure=structure,
         ),
     ]
     degrees = np.deg2rad

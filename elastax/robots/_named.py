@@ -6,6 +6,7 @@ from collections.abc import Callable
 from ..dynamics import ElasticRobot
 from ..io import arm_from_urdf, load_robot, robot_from_urdf
 from ..kinematics import Arm
+from ._arm_structure import LumpedArm, ModalArm, TiltedArm
 from ._fanuc import fanuc
 from ._iiwa14 import iiwa14
 from ._kr16 import kr16
@@ -18,6 +19,9 @@ from ._ur10e import ur10e
 
 ROBOTS = {
     "kr210": kr210,
+    "kr210_tilted": lambda: kr210(TiltedArm()),
+    "kr210_lumped": lambda: kr210(LumpedArm()),
+    "kr210_modal": lambda: kr210(ModalArm()),
     "kr300": kr300,
     "kr16": kr16,
     "manutec_r3": manutec_r3,

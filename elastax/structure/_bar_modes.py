@@ -29,22 +29,22 @@ class BarModes(eqx.Module):
         frequencies: $\omega_k$ in ascending order [rad/s].
         amplitudes: signed, shape (modes,).
         wave_numbers: [1/m].
-        phase: of the sine: zero at a base that is held, a quarter turn if it is free.
+        held: whether the base is; the sine has a phase of a quarter turn if not.
     """
 
     frequencies: Float[Array, " modes"]
     amplitudes: Float[Array, " modes"]
     wave_numbers: Float[Array, " modes"]
-    phase: float = eqx.field(static=True)
+    held: bool = eqx.field(static=True)
 
     def value(self, x: Float[Array, " points"]) -> Float[Array, "modes points"]:
         """Eigenfunctions at x from the base [m]."""
-        argument = self.wave_numbers[:, None] * x[None] + self.phase
+        argument = self.wave_numbers[:, None] * x[None] + _phase(self.held)
         return self.amplitudes[:, None] * jnp.sin(argument)
 
     def slope(self, x: Float[Array, " points"]) -> Float[Array, "modes points"]:
         """First derivatives by x."""
-        argument = self.wave_numbers[:, None] * x[None] + self.phase
+        argument = self.wave_numbers[:, None] * x[None] + _phase(self.held)
         size = self.amplitudes * self.wave_numbers
         return size[:, None] * jnp.cos(argument)
 
@@ -105,13 +105,17 @@ def bar_modes(
     # one step of Newton's method for the last digits and for the derivatives
     value, slope = jax.jvp(residual, (y,), (jnp.ones_like(y),))
     beta = start + y - value / slope
-    phase = 0.0 if held else 0.5 * np.pi
+    phase = _phase(held)
     end = jnp.sin(beta + phase)
     ripple = (jnp.sin(2.0 * (beta + phase)) - np.sin(2.0 * phase)) / (4.0 * beta)
     mass = mu * l * (0.5 - ripple) + tip * end**2
     return BarModes(
-        beta * jnp.sqrt(c / mu) / l, jnp.sign(end) / jnp.sqrt(mass), beta / l, phase
+        beta * jnp.sqrt(c / mu) / l, jnp.sign(end) / jnp.sqrt(mass), beta / l, held
     )
+
+
+def _phase(held: bool) -> float:
+    return 0.0 if held else 0.5 * np.pi
 
 
 def torsion_modes(

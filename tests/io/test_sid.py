@@ -99,7 +99,8 @@ def test_real_files(name, tmp_path, data_dir):
     assert_close(frequencies, hertz, rtol=1e-5, atol=5e-4)
     assert_close(body.O_e0, data.Oe_0, rtol=1e-10, atol=1e-10 * abs(data.Oe_0).max())
     if not stiffened:
-        size = np.abs(data.Ge).max()
+        # of one mode there is none; the file has what rounding left of M_e
+        size = max(np.abs(data.Ge).max(), np.abs(data.Me).max())
         assert_close(body.G_e, data.Ge, rtol=1e-9, atol=1e-10 * size)
     for dialect in DIALECTS:
         save_sid(tmp_path / "again.SID_FEM", data, dialect=dialect)
