@@ -12,32 +12,43 @@ from ..structure import ModalBody
 _ZERO = 1e-9
 
 
-def mounted_body(
-    name: str, body: ModalBody, base: str | None, place: Placement
-) -> ModalBody:
-    """The body in the frame behind the joint that carries it.
+def mounted_body(part, place: Placement) -> ModalBody:
+    """The body of a `FlexibleLink` in the frame behind the joint that carries it.
 
     Args:
-        name: of the link.
-        body: in its own reference frame.
-        base: node at which it is attached; the origin of its frame unless given.
-        place: of the point of attachment in the frame behind the joint.
+        part: the flexible link.
+        place: of the point of attachment in the frame behind the joint in front.
 
     Raises:
         ValueError: the modes move the point of attachment, or stiffness or damping are
             not diagonal.
     """
-    body = dataclasses.replace(body, name=name)
-    if base is not None:
-        shift = -np.asarray(body.nodes.position)[body.nodes.index(base)]
+    body = dataclasses.replace(part.body, name=part.name)
+    if part.base is not None:
+        shift = -np.asarray(body.nodes.position)[body.nodes.index(part.base)]
         if shift.any():
             body = body.moved(np.eye(3), shift)
-    _check_clamped(body)
     _check_diagonal(body)
     at = np.zeros(3) if place.position is None else np.asarray(place.position)
+    if part.floating:
+        if part.base is None:
+            raise ValueError(f"`{part.name}` floats: name its `base` node")
+        at = np.zeros(3)
+    else:
+        _check_clamped(body)
     if not at.any() and np.array_equal(place.rotation, np.eye(3)):
         return body
     return body.moved(place.rotation, at)
+
+
+def base_motion(body: ModalBody, base: str | None):
+    """Joints that lead from a node of attachment to the frame of its body.
+
+    What `node_motion` does, undone: the rotations back, then the displacements.
+    """
+    assert base is not None
+    _, steps = node_motion(body, base)
+    return [(axis, kind, -factors) for axis, kind, factors in reversed(steps)]
 
 
 def _check_clamped(body: ModalBody) -> None:
@@ -55,8 +66,8 @@ def _check_clamped(body: ModalBody) -> None:
                 raise ValueError(
                     f"the modes {', '.join(modes)} of `{body.name}` move the node "
                     f"`{node}` at which it is attached ({name} is not zero there): "
-                    "take modes that are clamped where the body is attached, or attach "
-                    "it by a `base` node at which they are"
+                    "take modes that are clamped where the body is attached, attach it "
+                    "by a `base` node at which they are, or let it float"
                 )
 
 

@@ -11,7 +11,7 @@ from ..structure import CubicStiffness, LinearStiffness, ModalBody
 from ._bodies import RigidBodies, no_bodies
 from ._inertia import check_inertia
 from ._modal_links import ModalLink
-from ._mounting import mounted_body, node_motion
+from ._mounting import base_motion, mounted_body, node_motion
 from ._robot import (
     AxisRole,
     ElasticRobot,
@@ -116,6 +116,8 @@ class FlexibleLink:
             body that ends the chain.
         base: name of the node that lies in the origin of the current frame; unless
             given, that is the origin of the body's own reference frame.
+        floating: whether the modes may move the node `base`, as those of supported or
+            free beams do. The reference frame then moves against the current frame.
 
     References:
         [Reiner2010] sections 2.4.2 and 3.7.
@@ -125,6 +127,7 @@ class FlexibleLink:
     body: ModalBody
     node: str | None = None
     base: str | None = None
+    floating: bool = False
 
 
 @dataclasses.dataclass(frozen=True)
@@ -180,6 +183,19 @@ def assemble(
     hinge_axes, slopes, links = {}, [], []
     place = SAME
     wrist, mark = None, False
+
+    def attach(steps, place: Placement, first: int) -> Placement:
+        """Joints that modes move, and the placement of what follows."""
+        for direction, kind, factors in steps:
+            moving = tuple(int(k) for k in np.flatnonzero(factors))
+            weights = tuple(range(len(slopes), len(slopes) + len(moving)))
+            slopes.extend(factors[k] for k in moving)
+            joints.append((place, (direction, True)))
+            kinds.append(kind)
+            roles.append(NodeRole(tuple(first + k for k in moving), weights))
+            place = SAME
+        return place
+
     for part in parts:
         match part:
             case Offset():
@@ -205,7 +221,11 @@ def assemble(
                         "of it: on the ground it moves nothing"
                     )
                 first = len(elastic_names)
-                body = mounted_body(part.name, part.body, part.base, place)
+                turn = Placement(place.rotation, None, place.is_structure)
+                body = mounted_body(part, place)
+                if part.floating:
+                    attach(base_motion(body, part.base), place, first)
+                    place = SAME
                 links.append(ModalLink(body, len(roles) - 1, first))
                 elastic_names += [f"{part.name}: {mode}" for mode in body.mode_names]
                 springs += [
@@ -213,20 +233,8 @@ def assemble(
                 ]
                 if part.node is None:
                     continue
-                turn = Placement(place.rotation, None, place.is_structure)
                 at, steps = node_motion(body, part.node)
-                place = Placement(np.eye(3), at)
-                for direction, kind, factors in steps:
-                    moving = tuple(np.flatnonzero(factors))
-                    number = len(slopes)
-                    weights = tuple(range(number, number + len(moving)))
-                    slopes += [factors[k] for k in moving]
-                    joints.append((place, (direction, True)))
-                    kinds.append(kind)
-                    roles.append(
-                        NodeRole(tuple(first + int(k) for k in moving), weights)
-                    )
-                    place = SAME
+                place = attach(steps, Placement(np.eye(3), at), first)
                 place = place.then(turn)
                 continue
             case Axis():

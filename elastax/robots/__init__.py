@@ -8,6 +8,12 @@ from ._arm_structure import (
     ModalArm as ModalArm,
     TiltedArm as TiltedArm,
 )
+from ._beam_manipulators import (
+    beam_on_joint as beam_on_joint,
+    one_link_arm as one_link_arm,
+    three_axis_arm as three_axis_arm,
+    two_beams as two_beams,
+)
 from ._fanuc import fanuc as fanuc
 from ._iiwa14 import iiwa14 as iiwa14
 from ._kr16 import kr16 as kr16
@@ -26,4 +32,5 @@ from ._named import (
     named_robot as named_robot,
 )
 from ._planar_2r import planar_2r as planar_2r
+from ._quanser_2dsfl import quanser_2dsfl as quanser_2dsfl
 from ._ur10e import ur10e as ur10e

@@ -26,8 +26,8 @@ from ..structure import (
     ModeCounts,
     SlenderBody,
     UniformBeam,
-    modal_beam,
 )
+from ._built_beam import built_beam
 
 
 class Member(NamedTuple):
@@ -164,7 +164,7 @@ class ModalArm(AbstractArmStructure):
         return False
 
     def member(self, name: str, tube: UniformBeam, damping_time: float) -> Member:
-        body = eqx.filter_jit(modal_beam)(tube, self.counts)
+        body = built_beam(tube, self.counts)
         stiffness = np.asarray(body.K_e)
         body = dataclasses.replace(
             body, D_e=damping_time * stiffness, nodes=_exact_base(body)
@@ -207,8 +207,8 @@ class BodiesArm(AbstractArmStructure):
         if np.linalg.norm(reach - expected) > 1e-6 * expected[0]:
             raise ValueError(
                 f"the body of `{name}` must reach from `{self.base}` to `{self.tip}` "
-                f"by {expected} m, but does by {reach}: turn it with `moved`, and check "
-                "its units"
+                f"by {expected} m, but does by {reach}: turn it with `moved`, and "
+                "check its units"
             )
         return modal_member(name, body, self.tip, self.base)
 
