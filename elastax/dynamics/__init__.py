@@ -21,6 +21,7 @@ from ._command import (
     MotorSample as MotorSample,
     MotorSetpoint as MotorSetpoint,
 )
+from ._cut_forces import cut_forces as cut_forces
 from ._dh import dh_link as dh_link
 from ._energy import (
     dissipated_power as dissipated_power,

@@ -204,6 +204,10 @@ class ElasticRobot(eqx.Module):
             self.slopes[np.array(slopes)]
         )
 
+    def axis_joint(self, axis: int) -> int:
+        """Index of an axis among the joints of the chain."""
+        return self.roles.index(AxisRole(axis))
+
     def joint_coordinates(self, q, eta):
         """Coordinates of all joints of the chain, of arrays or series."""
         stacked = concatenate([q, eta]) if self.elastic else q
