@@ -18,17 +18,6 @@ from ._results import (
     write_results as write_results,
 )
 from ._robot_file import load_robot as load_robot, robot_from_table as robot_from_table
-from ._sid_checks import identities as identities
-from ._sid_data import SidData as SidData, SidNode as SidNode
-from ._sid_file import (
-    FEMBS as FEMBS,
-    MATMOREMBS as MATMOREMBS,
-    PY_SID as PY_SID,
-    SidDialect as SidDialect,
-    load_sid as load_sid,
-    save_sid as save_sid,
-)
-from ._sid_layout import SidReport as SidReport
 from ._urdf import (
     arm_from_urdf as arm_from_urdf,
     robot_from_urdf as robot_from_urdf,
