@@ -181,8 +181,7 @@ class SidFile:
             name: for messages; the name in the file unless given.
 
         Raises:
-            ValueError: there is prestress in `ksigma`, or node axes that are turned,
-                or what `ModalBody` refuses.
+            ValueError: there is prestress in `ksigma`, or what `ModalBody` refuses.
         """
         blocks = self.blocks
         if largest(blocks["ksigma"].m0) or largest(blocks["ksigma"].m1):

@@ -67,7 +67,7 @@ def rotation_terms(matrix: np.ndarray, layout: AbstractColumnLayout) -> np.ndarr
 def find_rotation_layout(blocks: dict[str, SidBlock]) -> LayoutFinding:
     """Layout of `Gr`, for which its symmetric part is `J.m1`."""
     slopes = inertia_slopes(blocks["J"])
-    candidates = {
+    candidates: dict[AbstractColumnLayout, np.ndarray] = {
         layout: rotation_terms(blocks["Gr"].m0, layout) for layout in COLUMN_LAYOUTS
     }
     halves = {k: 0.5 * (g + np.swapaxes(g, 1, 2)) for k, g in candidates.items()}
@@ -86,7 +86,9 @@ def find_modal_layout(blocks: dict[str, SidBlock]) -> LayoutFinding:
     is the same unless `Cr.m1` holds geometric stiffening. Both are tried.
     """
     slopes = blocks["Cr"].m1
-    candidates = {layout: layout.unpack(blocks["Ge"].m0) for layout in COLUMN_LAYOUTS}
+    candidates: dict[AbstractColumnLayout, np.ndarray] = {
+        layout: layout.unpack(blocks["Ge"].m0) for layout in COLUMN_LAYOUTS
+    }
     zero = "" if largest(slopes) else "Cr.m1"
     found = []
     for identity, wanted in (

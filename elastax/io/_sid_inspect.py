@@ -5,6 +5,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ._sid_doubts import (
+    doubtful_content,
+    doubtful_layouts,
+    doubtful_units,
+    rotation_mismatch,
+    smallest_mass,
+)
 from ._sid_findings import (
     LayoutFinding,
     SquaresFinding,
@@ -12,9 +19,7 @@ from ._sid_findings import (
     find_rotation_layout,
     find_squares,
     inertia_slopes,
-    rotation_terms,
 )
-from ._sid_layout import AXIS_MAJOR
 from ._sid_report import SidIdentity, SidMeasure, SidReport
 from ._sid_taylor import SYMMETRIC_BLOCKS, IndexFinding, SidBlock
 from ._sid_tensors import (
@@ -23,16 +28,11 @@ from ._sid_tensors import (
     largest,
     residual,
     skew,
-    tensor,
 )
 
 
 # identities of consistent files hold to the printed digits, 1e-11
 _HOLDS = 1e-9
-# a body is hardly larger than this in metres
-_LARGE = 50.0
-# mass over the cube of the largest distance of anything built [kg/m^3]
-_THIN, _DENSE = 1e-4, 2e5
 
 
 def inspect_blocks(
@@ -64,15 +64,16 @@ def inspect_blocks(
     measures = _measures(mass, nodes, blocks, G_r)
     shown = _stiffening_blocks(nodes, blocks)
     size = _size(mass, nodes, blocks)
+    units, doubts_of_units = doubtful_units(mass, size)
     warnings = [
-        *_layout_doubts(blocks, indices, G_r, G_e, O_e),
+        *doubtful_layouts(blocks, indices, G_r, G_e, O_e),
         *(
             f"`{identity.name}` does not hold: residual {identity.residual:.1e}"
             for identity in identities
             if identity.residual > _HOLDS
         ),
-        *_unit_doubts(mass, size),
-        *_content_doubts(mass, nodes, blocks, counts, G_e, shown),
+        *doubts_of_units,
+        *doubtful_content(mass, nodes, blocks, counts, G_r, G_e, shown),
     ]
     return SidReport(
         path,
@@ -90,6 +91,7 @@ def inspect_blocks(
         identities,
         measures,
         size,
+        units,
         tuple(warnings),
     )
 
@@ -158,21 +160,15 @@ def _identity(
 def _measures(
     mass: float, nodes: Sequence, blocks: dict[str, SidBlock], G_r: LayoutFinding
 ) -> tuple[SidMeasure, ...]:
-    rotary = rotation_terms(blocks["Gr"].m0, G_r.layout or AXIS_MAJOR)
-    rotary = 0.5 * (rotary - np.swapaxes(rotary, 1, 2))
     slopes, squares = blocks["Cr"].m1, blocks["Oe"].m1
     # both are squares of the mode shapes times masses
     size = max(largest(slopes), largest(blocks["Me"].m0))
     trace = np.sum(squares[:, :, :3], axis=-1)
     curved = max((asymmetry_of_shapes(node) for node in nodes), default=0.0)
-    matrix = mass_matrix(mass, blocks)
-    scale = np.sqrt(np.abs(np.diag(matrix)))
-    scale = np.where(scale > 0, scale, 1.0)
-    smallest = np.linalg.eigvalsh(matrix / scale[:, None] / scale[None])[0]
     return (
         SidMeasure(
             "Gr against Cr.m0",
-            residual(rotary, -skew(blocks["Cr"].m0)),
+            rotation_mismatch(blocks, G_r),
             "rotary inertia of the nodes makes them differ",
         ),
         SidMeasure(
@@ -202,7 +198,7 @@ def _measures(
         ),
         SidMeasure(
             "mass matrix, smallest eigenvalue",
-            float(smallest),
+            smallest_mass(mass, blocks),
             "with a unit diagonal, undeformed; must be positive",
         ),
     )
@@ -211,19 +207,6 @@ def _measures(
 def asymmetry_of_shapes(node) -> float:
     """Of `phi.m1` of a node in mode and column."""
     return asymmetry(np.moveaxis(node.blocks["phi"].m1, 0, -1))
-
-
-def mass_matrix(mass: float, blocks: dict[str, SidBlock]) -> np.ndarray:
-    """Mass matrix of the undeformed body, shape (6 + modes, 6 + modes)."""
-    moment = skew(blocks["mdCM"].m0[:, 0])
-    C_t, C_r = blocks["Ct"].m0, blocks["Cr"].m0
-    return np.block(
-        [
-            [mass * np.eye(3), -moment, C_t.T],
-            [moment, tensor(blocks["J"].m0[:, 0]), C_r.T],
-            [C_t, C_r, blocks["Me"].m0],
-        ]
-    )
 
 
 def _stiffening_blocks(nodes: Sequence, blocks: dict[str, SidBlock]) -> tuple[str, ...]:
@@ -258,102 +241,3 @@ def _size(mass: float, nodes: Sequence, blocks: dict[str, SidBlock]) -> float:
     places.append(blocks["mdCM"].m0[:, 0] / mass)
     gyration = np.sqrt(max(np.sum(blocks["J"].m0[:3]) / (2 * mass), 0.0))
     return max(float(gyration), *(float(np.linalg.norm(place)) for place in places))
-
-
-def _unit_doubts(mass: float, size: float) -> list[str]:
-    doubts = []
-    density = mass / size**3 if size > 0 else None
-    if size > _LARGE or (density is not None and density < _THIN):
-        doubts.append(
-            f"lengths look like millimetres: distances up to {size:.4g} and a mass of "
-            f"{mass:.4g}; if so, take `scaled(length=1e-3)`, and `mass=1e3` with it "
-            "if the mass is in tonnes"
-        )
-    elif density is not None and density > _DENSE:
-        doubts.append(
-            f"a mass of {mass:.4g} within distances up to {size:.4g} is denser than "
-            "any metal: are these kilogrammes and metres?"
-        )
-    return doubts
-
-
-def _layout_doubts(
-    blocks: dict[str, SidBlock],
-    indices: IndexFinding,
-    G_r: LayoutFinding,
-    G_e: LayoutFinding,
-    O_e: SquaresFinding,
-) -> list[str]:
-    doubts = []
-    if not indices.decided:
-        doubts.append(
-            "the order of the indices of `m1` cannot be told: they were read as "
-            f"{indices.order.name}; name the dialect to `load_sid` if they are not"
-        )
-    for name, finding in (("Gr", G_r), ("Ge", G_e)):
-        if finding.layout is None:
-            doubts.append(f"columns of `{name}` {finding.verdict}")
-    if not O_e.decided and largest(blocks["Oe"].m1[:, :, 4:]):
-        doubts.append(f"columns of `Oe` {O_e.verdict}: read as xy, yz, xz")
-    return doubts
-
-
-def _content_doubts(
-    mass: float,
-    nodes: Sequence,
-    blocks: dict[str, SidBlock],
-    counts: tuple[int, int],
-    G_e: LayoutFinding,
-    shown: tuple[str, ...],
-) -> list[str]:
-    doubts = []
-    if counts[0] != len(nodes):
-        doubts.append(
-            f"the first line counts {counts[0]} nodes, but there are {len(nodes)}"
-        )
-    matrix = mass_matrix(mass, blocks)
-    scale = np.sqrt(np.abs(np.diag(matrix)))
-    scale = np.where(scale > 0, scale, 1.0)
-    smallest = np.linalg.eigvalsh(matrix / scale[:, None] / scale[None])[0]
-    if not smallest > 0:
-        doubts.append(
-            "the mass matrix of the undeformed body is not positive definite "
-            f"(smallest eigenvalue {smallest:.2g} with a unit diagonal): the body "
-            "cannot be let loose in a simulation"
-        )
-    moment = skew(blocks["mdCM"].m0[:, 0])
-    about_centre = tensor(blocks["J"].m0[:, 0]) + moment @ moment / mass
-    least = np.linalg.eigvalsh(about_centre)[0]
-    if least < -1e-9 * largest(about_centre):
-        doubts.append(
-            f"the inertia about the centre of mass has a negative principal moment, "
-            f"{least:.4g}"
-        )
-    uneven = asymmetry(blocks["Oe"].m1)
-    if uneven > 1e-6:
-        doubts.append(
-            f"Oe.m1 is not symmetric in its modes ({uneven:.3g} of its largest "
-            "element): the body takes the mean"
-        )
-    if largest(blocks["ksigma"].m0) or largest(blocks["ksigma"].m1):
-        doubts.append("ksigma is not zero: a modal body has no prestress")
-    uneven = residual(blocks["Cr"].m1, -np.swapaxes(blocks["Cr"].m1, 0, 1)) / 2
-    if G_e.identity == "Ge = 2 Cr.m1" and uneven > 1e-6 and "Cr.m1" in shown:
-        doubts.append(
-            "Ge is twice Cr.m1 with its symmetric part, which the equations of motion "
-            "do not have: the body takes Cr.m1 - Cr.m1^T"
-        )
-    for name, block in blocks.items():
-        if largest(block.mn):
-            doubts.append(f"`{name}` has second-order numbers `mn`, which are not used")
-    for node in nodes:
-        for name in ("psi", "sigma"):
-            if name in node.blocks and largest(node.blocks[name].m1):
-                doubts.append(
-                    f"`{name}` of node {node.label} changes with the modes, which is "
-                    "not used"
-                )
-        for name, block in node.blocks.items():
-            if largest(block.mn):
-                doubts.append(f"`{name}` of node {node.label} has `mn`, not used")
-    return doubts

@@ -1,7 +1,6 @@
 """How generators of SID_FEM files lay out columns, indices and symmetric matrices."""
 
 import abc
-from typing import ClassVar
 
 import equinox as eqx
 import numpy as np
@@ -10,7 +9,10 @@ import numpy as np
 class AbstractColumnLayout(eqx.Module):
     """Which column of `Gr` and `Ge` belongs to a mode and an axis."""
 
-    name: eqx.AbstractClassVar[str]
+    @property
+    @abc.abstractmethod
+    def name(self) -> str:
+        """In words, for reports."""
 
     @abc.abstractmethod
     def unpack(self, matrix: np.ndarray) -> np.ndarray:
@@ -24,7 +26,9 @@ class AbstractColumnLayout(eqx.Module):
 class AxisMajor(AbstractColumnLayout):
     """All modes of the first axis, then of the second: column (a - 1) modes + l."""
 
-    name: ClassVar[str] = "axis-major"
+    @property
+    def name(self) -> str:
+        return "axis-major"
 
     def unpack(self, matrix: np.ndarray) -> np.ndarray:
         return np.swapaxes(matrix.reshape(matrix.shape[0], 3, -1), 1, 2)
@@ -36,7 +40,9 @@ class AxisMajor(AbstractColumnLayout):
 class ModeMajor(AbstractColumnLayout):
     """The axes of the first mode, then of the second: column 3 (l - 1) + a."""
 
-    name: ClassVar[str] = "mode-major"
+    @property
+    def name(self) -> str:
+        return "mode-major"
 
     def unpack(self, matrix: np.ndarray) -> np.ndarray:
         return matrix.reshape(matrix.shape[0], -1, 3)
@@ -48,28 +54,35 @@ class ModeMajor(AbstractColumnLayout):
 class AbstractIndexOrder(eqx.Module):
     """Order of the three indices of `m1`."""
 
-    name: eqx.AbstractClassVar[str]
+    @property
+    @abc.abstractmethod
+    def name(self) -> str:
+        """In words, for reports."""
 
     @abc.abstractmethod
-    def arrange(self, indices: tuple[int, int, int]) -> tuple[int, int, int]:
+    def arrange(self, indices: tuple[int, ...]) -> tuple[int, ...]:
         """From the file's indices to row, mode, column, and back."""
 
 
 class RowModeColumn(AbstractIndexOrder):
     """`m1(row, mode, column)`."""
 
-    name: ClassVar[str] = "row, mode, column"
+    @property
+    def name(self) -> str:
+        return "row, mode, column"
 
-    def arrange(self, indices: tuple[int, int, int]) -> tuple[int, int, int]:
+    def arrange(self, indices: tuple[int, ...]) -> tuple[int, ...]:
         return indices
 
 
 class RowColumnMode(AbstractIndexOrder):
     """`m1(row, column, mode)`."""
 
-    name: ClassVar[str] = "row, column, mode"
+    @property
+    def name(self) -> str:
+        return "row, column, mode"
 
-    def arrange(self, indices: tuple[int, int, int]) -> tuple[int, int, int]:
+    def arrange(self, indices: tuple[int, ...]) -> tuple[int, ...]:
         return indices[0], indices[2], indices[1]
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from ._sid_dialect import SidDialect
 from ._sid_file import SidFile, SidNode
+from ._sid_layout import INDEX_ORDERS, ROW_MODE_COLUMN
 from ._sid_records import RawSid, parse_records, refusal
 from ._sid_taylor import (
     SYMMETRIC_BLOCKS,
@@ -35,8 +36,25 @@ def load_sid(path: str | pathlib.Path, *, dialect: SidDialect | None = None) -> 
     """
     text = pathlib.Path(path).read_text(encoding="utf-8", errors="replace")
     raw = parse_records(text, str(path))
-    indices = find_index_order(raw, None if dialect is None else dialect.indices)
-    return _assemble(raw, indices, dialect)
+    indices = find_index_order(raw)
+    if indices.decided:
+        return _assemble(raw, indices, dialect)
+    return _by_identities(raw, dialect)
+
+
+def _by_identities(raw: RawSid, dialect: SidDialect | None) -> SidFile:
+    """The file with the order of indices that the identities hold for."""
+    make = lambda order, verdict, decided=True: _assemble(
+        raw, IndexFinding(order, verdict, decided), dialect
+    )
+    files = {order: make(order, "by the identities") for order in INDEX_ORDERS}
+    residuals = {order: file.report.largest_residual for order, file in files.items()}
+    best, other = sorted(INDEX_ORDERS, key=lambda order: residuals[order])
+    if residuals[best] < 1e-3 and residuals[other] > 100 * residuals[best]:
+        return files[best]
+    if dialect is not None:
+        return make(dialect.indices, f"undecidable, as in {dialect.name}")
+    return make(ROW_MODE_COLUMN, "undecidable, assumed", False)
 
 
 def _assemble(
@@ -109,8 +127,8 @@ def _assemble(
 
 
 def _check_positive(raw: RawSid, blocks: dict[str, SidBlock]) -> None:
-    """`Me` positive, `Ke` and `De` not negative."""
-    for name in SYMMETRIC_BLOCKS:
+    """`Me` positive, `Ke` not negative."""
+    for name in ("Me", "Ke"):
         smallest = np.linalg.eigvalsh(blocks[name].m0)[0]
         limit = 0.0 if name == "Me" else -1e-9 * np.abs(blocks[name].m0).max()
         if smallest < limit or (name == "Me" and smallest == 0):

@@ -133,13 +133,13 @@ def refusal(path: str, line: int, where: str, message: str) -> ValueError:
 
 
 def parse_real(text: str) -> float | None:
-    """A Fortran real such as `-1.5D-08`; `None` if it is none."""
+    """A Fortran real such as `-1.5D-08`; `None` if it is none, or beyond 1e60."""
     match = _REAL.fullmatch(text.strip())
     if match is None:
         return None
     exponent = match[2] or match[3] or "0"
     value = float(f"{match[1]}e{exponent}")
-    return value if abs(value) < float("inf") else None
+    return value if abs(value) < 1e60 else None
 
 
 class _Parser:
@@ -244,7 +244,7 @@ class _Parser:
             raise self.fail(
                 mass_line, where, f"`mass` must be a number, but is `{text}`"
             )
-        if not mass > 0:
+        if not mass > 1e-30:
             raise self.fail(
                 mass_line, where, f"`mass` must be positive, but is {mass:g}"
             )
@@ -355,5 +355,7 @@ class _Parser:
             )
         value = parse_real(right)
         if value is None:
-            raise self.fail(line, where, f"`{right.strip()}` is not a number: `{text}`")
+            raise self.fail(
+                line, where, f"`{right.strip()}` is not a number below 1e60: `{text}`"
+            )
         return Record(match[1], tuple(int(part) for part in parts), value, line)

@@ -1,6 +1,7 @@
 """What was found out about a SID_FEM file: layouts, identities, units, doubts."""
 
 import dataclasses
+import textwrap
 
 from ._report import Column, format_table
 from ._sid_findings import LayoutFinding, SquaresFinding
@@ -57,6 +58,7 @@ class SidReport:
         identities: those that hold in a consistent file.
         measures: what else may be told from the numbers.
         size: largest distance that is found in the file.
+        units: that size and mass suggest.
         warnings: one line each.
     """
 
@@ -75,6 +77,7 @@ class SidReport:
     identities: tuple[SidIdentity, ...]
     measures: tuple[SidMeasure, ...]
     size: float
+    units: str
     warnings: tuple[str, ...]
 
     @property
@@ -89,7 +92,7 @@ class SidReport:
         """The report as text for the terminal."""
         storage = ", ".join(f"{name} {how}" for name, how in self.storage.items())
         found = [
-            ("generator", self.generator or "-"),
+            ("generator", textwrap.shorten(self.generator, 100) or "-"),
             ("modes, nodes", f"{self.modes}, {self.nodes}"),
             ("block names", ", ".join(self.block_names)),
             ("m1 indices", f"{self.indices.order.name} ({self.indices.verdict})"),
@@ -98,7 +101,7 @@ class SidReport:
             ("Oe columns", self.O_e.verdict),
             ("storage", storage or "-"),
             ("geometric stiffening", self.stiffening),
-            ("largest distance", f"{self.size:.4g}"),
+            ("largest distance", f"{self.size:.4g}, {self.units}"),
         ]
         rows = [{"what": what, "is": text} for what, text in found]
         identities = [

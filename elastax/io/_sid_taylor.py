@@ -65,11 +65,10 @@ class IndexFinding:
     decided: bool
 
 
-def find_index_order(raw: RawSid, preferred: AbstractIndexOrder | None) -> IndexFinding:
+def find_index_order(raw: RawSid) -> IndexFinding:
     """Order of the indices of `m1` with the fewest indices out of range.
 
-    `origin.m1` has one column, so that any mode but the first tells the orders apart;
-    if there is none, the order that is preferred, else row, mode, column.
+    `origin.m1` has one column, so that any mode but the first tells the orders apart.
     """
     blocks = [*raw.blocks.values()]
     for node in raw.nodes:
@@ -84,14 +83,11 @@ def find_index_order(raw: RawSid, preferred: AbstractIndexOrder | None) -> Index
         order = min(INDEX_ORDERS, key=lambda o: misses[o])
         return IndexFinding(order, "by the ranges of the indices", True)
     if all(first.arrange(r.indices) == second.arrange(r.indices) for _, r in slopes):
-        verdict = "orders equivalent" if slopes else "orders equivalent: no `m1`"
-        return IndexFinding(preferred or first, verdict, True)
-    return IndexFinding(
-        preferred or first, "undecidable, assumed", preferred is not None
-    )
+        return IndexFinding(first, "orders equivalent", True)
+    return IndexFinding(first, "undecidable by the ranges of the indices", False)
 
 
-def _inside(place: tuple[int, int, int], block: RawBlock) -> bool:
+def _inside(place: tuple[int, ...], block: RawBlock) -> bool:
     sizes = block.sizes
     return all(
         1 <= k <= size
@@ -145,11 +141,14 @@ def fill_block(
             lines["structure"],
             f"structure {structure} needs a square matrix, not {rows} x {columns}",
         )
-    if sizes["nqn"] > max(10_000, modes * modes):
-        raise fail(lines["nqn"], f"`nqn` is implausible: {sizes['nqn']}")
+    if sizes["nqn"] > max(100, modes * modes):
+        raise fail(
+            lines["nqn"],
+            f"`nqn` must be at most {max(100, modes * modes)}, not {sizes['nqn']}",
+        )
     m0 = np.eye(rows) if structure == UNIT else np.zeros((rows, columns))
     m1 = np.zeros((rows, modes, columns))
-    mn = np.zeros((rows, sizes["nqn"], columns))
+    mn = np.zeros((rows, sizes["nqn"] if sizes["order"] == 2 else 0, columns))
     seen: dict[tuple, int] = {}
     for record in raw.records:
         place, target = _place(fail, record, raw, order, (m0, m1, mn))

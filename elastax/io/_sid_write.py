@@ -176,7 +176,7 @@ def _block(
         yield _assign(26, f"m0({i + 1:2d},{j + 1:2d})", value)
     for kind, array in (("m1", block.m1), ("mn", block.mn)):
         for j, i, q in np.argwhere(np.moveaxis(array, 2, 0)):
-            place = dialect.indices.arrange((i + 1, q + 1, j + 1))
+            place = dialect.indices.arrange((int(i) + 1, int(q) + 1, int(j) + 1))
             indices = ",".join(f"{k:2d}" for k in place)
             value = _real(array[i, q, j], dialect)
             yield _assign(26, f"{kind}({indices})", value)
@@ -187,5 +187,5 @@ def _assign(depth: int, key: str, value: str) -> str:
     return f"{' ' * depth + key:<{_EQUAL}}={value}"
 
 
-def _real(value: float, dialect: SidDialect) -> str:
+def _real(value: float | np.ndarray, dialect: SidDialect) -> str:
     return f"{float(value): .11E}".replace("E", dialect.exponent)
