@@ -1,10 +1,13 @@
 """Bodies whose SID files the tests write."""
 
+import functools
+
 import jax.numpy as jnp
 import numpy as np
 from elastax.structure import BodyNodes, ModalBody, point_mass_body
 
 
+@functools.cache
 def random_body(modes: int = 3, curved: bool = True, names=("7", "12")) -> ModalBody:
     """Six points of mass of no particular kind, two of them nodes.
 

@@ -211,9 +211,21 @@ def test_blanks_and_windows_lines_do_not_matter(lines, tmp_path):
         assert np.array_equal(one.blocks[name].m1, other.blocks[name].m1)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(data=st.data())
 def test_mutated_files_are_read_or_refused_with_a_line(lines, tmp_path_factory, data):
+    check_mutation(lines, tmp_path_factory.mktemp("mutated") / "bad.SID_FEM", data)
+
+
+@pytest.mark.slow
+@settings(max_examples=1000, deadline=None)
+@given(data=st.data())
+def test_many_mutated_files(lines, tmp_path_factory, data):
+    check_mutation(lines, tmp_path_factory.mktemp("mutated") / "bad.SID_FEM", data)
+
+
+def check_mutation(lines, path, data):
+    """A line that is lost, moved, there twice or changed, or a file cut off."""
     pick = lambda top: data.draw(st.integers(0, top))
     changed = list(lines)
     kind = data.draw(st.sampled_from(["drop", "swap", "cut", "text", "repeat"]))
@@ -232,12 +244,11 @@ def test_mutated_files_are_read_or_refused_with_a_line(lines, tmp_path_factory, 
         letters = "0123456789-+.,()=DEabmn \x00\x0c"
         text = data.draw(st.text(st.sampled_from(letters), max_size=3))
         changed[k] = changed[k][:at] + text + changed[k][at + pick(3) :]
-    path = tmp_path_factory.mktemp("mutated") / "bad.SID_FEM"
     path.write_text("\n".join(changed))
     try:
         file = load_sid(path)
     except ValueError as error:
-        assert re.search(r"line \d+, ", str(error))  # noqa: PT017
+        assert re.search(r"line \d+, ", str(error))
     else:
         assert isinstance(file, SidFile)
         assert str(file.report)

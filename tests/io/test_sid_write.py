@@ -189,3 +189,47 @@ def test_prestress_is_refused_by_the_body_alone():
     assert "ksigma is not zero: a modal body has no prestress" in file.report.warnings
     with pytest.raises(ValueError, match="`ksigma` holds a prestress"):
         file.modal_body()
+
+
+def changed_block(file, name, **changes):
+    block = dataclasses.replace(file.blocks[name], **changes)
+    return dataclasses.replace(file, blocks=file.blocks | {name: block})
+
+
+@pytest.mark.parametrize(
+    ("change", "doubt"),
+    [
+        (lambda f: dataclasses.replace(f, mass=1e9), "denser than any metal"),
+        (lambda f: f.scaled(length=1e3), "lengths look like millimetres"),
+        (lambda f: f.scaled(length=1e3, mass=1e-3), "lengths look like millimetres"),
+        (
+            lambda f: changed_block(f, "De", m0=-f.blocks["De"].m0),
+            "De has the negative eigenvalue",
+        ),
+        (
+            lambda f: changed_block(f, "Cr", m0=10.0 * f.blocks["Cr"].m0),
+            "Gr and Cr.m0 differ by",
+        ),
+        (
+            lambda f: changed_block(f, "J", m0=0.1 * f.blocks["J"].m0),
+            "negative principal moment",
+        ),
+        (
+            lambda f: changed_block(f, "Me", m0=0.01 * f.blocks["Me"].m0),
+            "the mass matrix of the undeformed body is not positive definite",
+        ),
+        (
+            lambda f: changed_block(f, "Ke", m1=np.ones((3, 3, 3))),
+            "`Ke` changes with the modes, which is not used",
+        ),
+        (
+            lambda f: changed_block(f, "mdCM", m1=2.0 * f.blocks["mdCM"].m1),
+            "`mdCM.m1 = Ct.m0^T` does not hold: residual 5.0e-01",
+        ),
+    ],
+)
+def test_doubts_about_the_content(change, doubt):
+    file = sid_from_body(random_body())
+    assert file.report.warnings == ()
+    assert any(doubt in line for line in change(file).report.warnings)
+    assert doubt in str(change(file).report)
