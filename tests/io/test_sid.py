@@ -25,7 +25,6 @@ FILES = (BEAM, ONE_MODE, FREE_BEAM, PLANE, FIVE_NODES)
 DIALECTS = (FEMBS, PY_SID, MATMOREMBS, FEMBEAM)
 
 each_file = pytest.mark.parametrize("name", FILES)
-each_dialect = pytest.mark.parametrize("dialect", DIALECTS, ids=lambda d: d.name)
 
 
 @pytest.fixture
@@ -203,8 +202,20 @@ def same_content(one, other):
     assert np.array_equal(one.G_e, other.G_e)
 
 
-@each_file
-@each_dialect
+@pytest.mark.parametrize(
+    ("name", "dialect"),
+    [
+        pytest.param(
+            name,
+            dialect,
+            # eight thousand numbers, three times
+            marks=[pytest.mark.slow] if name == BEAM and dialect != PY_SID else [],
+            id=f"{name}-{dialect.name}",
+        )
+        for name in FILES
+        for dialect in DIALECTS
+    ],
+)
 def test_round_trip_keeps_every_digit(load, tmp_path, name, dialect):
     file = load(name)
     save_sid(tmp_path / "again.SID_FEM", file, dialect=dialect)
