@@ -18,6 +18,33 @@ from ._results import (
     write_results as write_results,
 )
 from ._robot_file import load_robot as load_robot, robot_from_table as robot_from_table
+from ._sid_dialect import (
+    FEMBEAM as FEMBEAM,
+    FEMBS as FEMBS,
+    MATMOREMBS as MATMOREMBS,
+    PY_SID as PY_SID,
+    SidDialect as SidDialect,
+)
+from ._sid_file import SidFile as SidFile, SidNode as SidNode
+from ._sid_layout import (
+    AXIS_MAJOR as AXIS_MAJOR,
+    MODE_MAJOR as MODE_MAJOR,
+    ROW_COLUMN_MODE as ROW_COLUMN_MODE,
+    ROW_MODE_COLUMN as ROW_MODE_COLUMN,
+    AbstractColumnLayout as AbstractColumnLayout,
+    AbstractIndexOrder as AbstractIndexOrder,
+    AbstractStorage as AbstractStorage,
+    SpecialStorage as SpecialStorage,
+    TriangularStorage as TriangularStorage,
+)
+from ._sid_read import load_sid as load_sid
+from ._sid_report import (
+    SidIdentity as SidIdentity,
+    SidMeasure as SidMeasure,
+    SidReport as SidReport,
+)
+from ._sid_taylor import IndexFinding as IndexFinding, SidBlock as SidBlock
+from ._sid_write import save_sid as save_sid, sid_from_body as sid_from_body
 from ._urdf import (
     arm_from_urdf as arm_from_urdf,
     robot_from_urdf as robot_from_urdf,
