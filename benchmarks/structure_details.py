@@ -57,11 +57,11 @@ def sid_robot() -> ElasticRobot:
             body = link.body
             base = np.asarray(body.nodes.position)[0]
             save_sid(path, body.moved(np.eye(3), -base))
-            bodies.append(load_sid(path)[0].modal_body())
+            bodies.append(load_sid(path).modal_body())
     # the arm's frame is that of its joint: turned so that x runs along the member
     reach = np.asarray(bodies[1].nodes.position)[-1]
     bodies[1] = bodies[1].moved(_turn(reach / np.linalg.norm(reach)), np.zeros(3))
-    return kr210(BodiesArm(bodies[0], bodies[1]))
+    return kr210(BodiesArm(bodies[0], bodies[1], base="1", tip="2"))
 
 
 def _turn(direction: np.ndarray) -> np.ndarray:
@@ -80,7 +80,7 @@ DETAILS = {
     "beams, modes 1 1 1": lambda: kr210(ModalArm()),
     "beams, modes 2 2 1": lambda: kr210(ModalArm(ModeCounts(2, 2, 1))),
     "SID bodies, modes 2 2 1": sid_robot,
-    "beams, modes 4 4 2": lambda: kr210(ModalArm(ModeCounts(4, 4, 2))),
+    "beams, modes 3 3 2": lambda: kr210(ModalArm(ModeCounts(3, 3, 2))),
 }
 
 

@@ -152,23 +152,22 @@ class ModalArm(AbstractArmStructure):
 
     Attributes:
         counts: modes of each member; `bending_xy` of the link arm is in its plane.
+        damping_ratio: of every mode, 1 % as the hinges have at 10 Hz.
 
     References:
         [Reiner2010] section 2.4.2.
     """
 
     counts: ModeCounts = ModeCounts(1, 1, 1)
+    damping_ratio: float = 0.01
 
     @property
     def has_hinges(self) -> bool:
         return False
 
     def member(self, name: str, tube: UniformBeam, damping_time: float) -> Member:
-        body = built_beam(tube, self.counts)
-        stiffness = np.asarray(body.K_e)
-        body = dataclasses.replace(
-            body, D_e=damping_time * stiffness, nodes=_exact_base(body)
-        )
+        body = built_beam(tube, self.counts, damping_ratio=self.damping_ratio)
+        body = dataclasses.replace(body, nodes=_exact_base(body))
         return modal_member(name, body, "tip", None)
 
 
@@ -184,8 +183,7 @@ class BodiesArm(AbstractArmStructure):
         [Reiner2010] section 3.7.
 
     Examples:
-        >>> data, report = load_sid("link_arm.SID_FEM")
-        >>> body = data.modal_body().with_damping_ratio(0.01)
+        >>> body = load_sid("link_arm.SID_FEM").modal_body().with_damping_ratio(0.01)
         >>> robot = kr210(BodiesArm(body, other, base="1", tip="2"))
     """
 

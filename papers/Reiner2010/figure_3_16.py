@@ -1,4 +1,4 @@
-"""Figures 3.16 and 3.17: what each simplification of a beam changes. [Reiner2010], p. 74.
+"""Figures 3.16 and 3.17: simplifications of a flexible beam. [Reiner2010], p. 74.
 
 A three-axis arm with a flexible beam behind axis 3 and an eccentric load; all axes
 follow the same filtered sine. The text gives no parameters: those of
@@ -44,7 +44,7 @@ VARIANTS = {
 }
 AMPLITUDE, FREQUENCY, LAG = 0.35, 1.5, 0.05  # [rad], [Hz], [s] of the filter
 POSE = np.array([0.0, 0.5, -0.9])  # around which the axes move [rad]
-STEP, DURATION, KEPT = 5e-5, 2.0, 20  # [s], [s], every so many steps
+STEP, DURATION, KEPT = 1e-4, 2.0, 10  # [s], [s], every so many steps
 
 
 def angles(t):
