@@ -112,3 +112,34 @@ def test_manutec_r3_of_modelica(data_dir, tmp_path):
         assert figures[f"axis{k}.motor.La.i"] < 1e-2
     assert figures["modes agree"] > 0.99
     assert (tmp_path / "robot_r3.png").exists()
+
+
+@pytest.mark.slow
+def test_figure_3_16(tmp_path, capsys):
+    script = load("Reiner2010/figure_3_16.py")
+    names = ("nominal", "variant 1", "variant 4", "variant 5")
+    ours = script.main(tmp_path / "figure.png", names)
+    assert (tmp_path / "figure.png").stat().st_size > 10_000
+    assert "rigid" in capsys.readouterr().out
+    for what in ("load", "force", "moment"):
+        off = {name: ours[f"{name}: {what}"] for name in (*names[1:], "rigid")}
+        # the text: 5 nearly nominal, 1 to 4 alike, rigid far off
+        assert off["variant 5"] < 0.1 * off["variant 1"]
+        assert abs(off["variant 4"] / off["variant 1"] - 1.0) < 0.1
+        assert off["rigid"] > 5.0 * off["variant 1"]
+
+
+@pytest.mark.slow
+def test_spin_up(tmp_path, capsys):
+    script = load("SimoVuQuoc1988/spin_up.py")
+    ours = script.main(tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").stat().st_size > 10_000
+    assert "extension" in capsys.readouterr().out
+    extension = ours["extension over the last 2 s [m]"]
+    assert abs(extension / 5.143e-4 - 1.0) < 0.02
+    # a lag of 0.57 m is what the literature shows; more modes change nothing
+    lag = ours["largest lag [m]"]
+    assert 0.55 < lag < 0.60
+    assert abs(ours["largest lag with five modes [m]"] / lag - 1.0) < 1e-3
+    assert ours["largest deflection in the last 2 s [m]"] < 0.01
+    assert ours["without shortening, lag of 10 m after [s]"] < 12.0

@@ -6,7 +6,7 @@ from ..structure import BeamSegments, ClampHinges, GaussHinges
 from ._parts import Body, ElasticJoint, EndSlope, Offset, Part
 
 
-X, Y, Z = map(tuple, np.eye(3).tolist())
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
 def segmented_beam_parts(

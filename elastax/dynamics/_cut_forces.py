@@ -4,6 +4,7 @@ import jax.numpy as jnp
 
 from .._custom_types import PerElastic, PerJoint, Vector3
 from .._kernel import kernel
+from .._taylor import leading
 from ..kinematics import moving_frames
 from ._modal_links import base_forces
 from ._robot import ElasticRobot
@@ -37,10 +38,11 @@ def cut_forces(
     References:
         [Reiner2010] (2.29), figure 3.17.
     """
-    wrenches = _wrenches(robot, q, eta, qd, etad, qdd, etadd)
+    total = _wrenches(robot, q, eta, qd, etad, qdd, etadd)
     frames = moving_frames(robot.chain, robot.joint_coordinates(q, eta))
-    rotation, position = frames.rotation[joint], frames.position[joint]
-    force, moment = wrenches[joint, :3], wrenches[joint, 3:]
+    rotation = leading(frames.rotation)[joint]
+    position = leading(frames.position)[joint]
+    force, moment = total[joint, :3], total[joint, 3:]
     moment = moment - jnp.cross(position, force)
     return rotation.T @ force, rotation.T @ moment
 

@@ -4,6 +4,7 @@ from ._drive_parts import (
     drives_with_parts as drives_with_parts,
     load_drive_parts as load_drive_parts,
 )
+from ._matrices import load_matrices as load_matrices
 from ._recording import load_recording as load_recording
 from ._report import (
     FEEDFORWARD_COLUMNS as FEEDFORWARD_COLUMNS,

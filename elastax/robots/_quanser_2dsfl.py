@@ -40,7 +40,8 @@ def quanser_2dsfl() -> ElasticRobot:
     z = (0.0, 0.0, 1.0)
     disc = lambda inertia: np.diag([inertia, inertia, inertia])
     rotors = [GEAR[k] ** 2 * ROTOR[k] for k in range(2)]
-    first = LINK_INERTIA[0] - HUB_INERTIA[1] - LINK_INERTIA[1]
+    # of the second stage all but its rotor turns with the first link
+    first = LINK_INERTIA[0] - (HUB_INERTIA[1] - rotors[1]) - LINK_INERTIA[1]
     parts: list[Part] = [
         Axis("A1"),
         Body("hub 1", 0.0, (0.0, 0.0, 0.0), disc(HUB_INERTIA[0] - rotors[0])),

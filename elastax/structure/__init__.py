@@ -23,6 +23,7 @@ from ._beam_body import (
     TipMass as TipMass,
     modal_beam as modal_beam,
 )
+from ._beam_elements import beam_frame as beam_frame, beam_line as beam_line
 from ._beam_segments import BeamSegments as BeamSegments, SlenderBody as SlenderBody
 from ._beam_supports import (
     AbstractSupport as AbstractSupport,
@@ -45,6 +46,12 @@ from ._body_detail import (
 )
 from ._body_nodes import BodyNodes as BodyNodes, no_nodes as no_nodes
 from ._exponential_stiffness import ExponentialStiffness as ExponentialStiffness
+from ._finite_elements import (
+    FiniteElementModel as FiniteElementModel,
+    craig_bampton as craig_bampton,
+    eigenmodes as eigenmodes,
+    modal_body as modal_body,
+)
 from ._floating_frame import (
     BodyForces as BodyForces,
     element_motion as element_motion,

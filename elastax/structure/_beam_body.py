@@ -80,6 +80,7 @@ def modal_beam(
     support: AbstractSupport = ClampedFree(),
     tip: TipMass | None = None,
     rotary_inertia: bool = True,
+    shortening: bool = True,
     damping_ratio=0.0,
     nodes: Sequence[float] = (),
     name: str = "beam",
@@ -99,6 +100,8 @@ def modal_beam(
         tip: mass at the end.
         rotary_inertia: whether the cross sections have inertia (Rayleigh) or not
             (Euler and Bernoulli); about x they always do.
+        shortening: whether a bent beam is shortened. Without it there is no geometric
+            stiffening, and a beam that turns fast diverges.
         damping_ratio: $\zeta$ of all modes, or one per mode.
         nodes: further nodes besides `base` and `tip`, as fractions of the length.
         name: of the body.
@@ -164,6 +167,8 @@ def modal_beam(
     psi = jnp.concatenate(turns, axis=2)
     slope = jnp.concatenate(slopes, axis=2)
     curved = _shortening(slope, _antiderivative(abscissas, places), length)
+    if not shortening:
+        curved = jnp.zeros_like(curved)
     count = len(abscissas)
     weights = jnp.asarray(weights)
     masses = mu * length * weights
