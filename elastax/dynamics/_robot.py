@@ -171,6 +171,12 @@ class ElasticRobot(eqx.Module):
         return hinges + sum(link.body.modes for link in self.modal_links)
 
     @property
+    def modal_coordinates(self) -> tuple[int, ...]:
+        """Elastic coordinates that are amplitudes of modes, not angles."""
+        spans = (range(x.first, x.first + x.body.modes) for x in self.modal_links)
+        return tuple(k for span in spans for k in span)
+
+    @property
     def has_elastic_gears(self) -> bool:
         """Whether the motors have coordinates of their own."""
         return self.drives.stiffness is not None

@@ -39,9 +39,7 @@ def load_matrices(
         if not parts or parts[0].startswith("#"):
             continue
         try:
-            label, *place = parts
-            positions.append([float(x) for x in place])
-            labels.append(label)
+            label, place = parts[0], [float(x) for x in parts[1:]]
         except ValueError:
             raise ValueError(
                 f"{nodes}, line {number}: `{line}` has no numbers"
@@ -50,4 +48,8 @@ def load_matrices(
             raise ValueError(
                 f"{nodes}, line {number}: a label and x, y, z are needed, not `{line}`"
             )
-    return FiniteElementModel(np.array(positions), *matrices, tuple(labels))
+        labels.append(label)
+        positions.append(place)
+    return FiniteElementModel(
+        np.array(positions), matrices[0], matrices[1], tuple(labels)
+    )

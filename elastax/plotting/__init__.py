@@ -22,6 +22,13 @@ from ._paths import (
 )
 from ._perturbations import plot_perturbations as plot_perturbations
 from ._recording import plot_recording as plot_recording
+from ._structure import (
+    animate as animate,
+    plot_deflection as plot_deflection,
+    plot_deformed as plot_deformed,
+    plot_modes as plot_modes,
+    skeleton as skeleton,
+)
 from ._style import save_figure as save_figure
 from ._workspace import (
     plot_dexterity_section as plot_dexterity_section,

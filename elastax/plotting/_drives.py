@@ -83,7 +83,9 @@ def plot_deformations(
                 axes.plot(times, 1e3 * values[:, k], color=colour, **style)
             axes.plot([], [], color=colour, lw=2.2, label=label)
         axes.set_title(name, fontsize=9.5, loc="left", color=INK)
-        axes.set_ylabel("angle [mrad]")
+        modal = {robot.elastic_names[k] for k in robot.modal_coordinates}
+        is_modal = set(labels) <= modal and len(labels) > 0
+        axes.set_ylabel("amplitude [$10^{-3}$]" if is_modal else "angle [mrad]")
         axes.legend(fontsize=8, ncols=2, loc="upper right", **FRAME)
         low, high = axes.get_ylim()
         axes.set_ylim(top=high + (0.25 if len(labels) > 2 else 0.15) * (high - low))
