@@ -179,7 +179,7 @@ def animate(
         width=6.5,
         subplot_kw={"projection": "3d"},
     )
-    (axes,) = figure.axes
+    axes: Any = figure.axes[0]
     _frame(axes, np.concatenate([*plain, *bent]))
     lines = [
         _draw(axes, plain[0], color="#aaaaaa", label="undeformed"),
