@@ -55,6 +55,7 @@ def info(config: InfoConfig, progress: Progress) -> int:
 def _print_robot(robot: ElasticRobot, progress: Progress) -> None:
     progress.say("compiling the eigenfrequencies ...")
     mass = float(np.sum(robot.bodies.mass))
+    mass += sum(float(link.body.mass) for link in robot.modal_links)
     load = float(np.sum(robot.payload.mass))
     print(
         f"{robot.name}: {robot.axes} axes, {robot.elastic} elastic coordinates, "
@@ -102,16 +103,31 @@ def axes_table(robot: ElasticRobot) -> str:
 
 
 def structure_table(robot: ElasticRobot) -> str:
-    """Springs and dampers of the elastic coordinates."""
+    """Springs and dampers of hinges, frequencies and damping ratios of modes."""
     assert robot.structure_stiffness is not None
     stiffness = np.asarray(
         robot.structure_stiffness.stiffness(jnp.zeros(robot.elastic))
     )
-    rows = [
-        [name, f"{stiffness[k]:.3g}", f"{float(robot.structure_damping[k]):.3g}"]
+    damping = np.asarray(robot.structure_damping)
+    hinges = [
+        [name, f"{stiffness[k]:.3g}", f"{damping[k]:.3g}"]
         for k, name in enumerate(robot.elastic_names)
+        if k not in robot.modal_coordinates
     ]
-    return table(rows, ["elastic coordinate", "spring [N m/rad]", "damper [N m s/rad]"])
+    modes = []
+    for link in robot.modal_links:
+        for k, mass in enumerate(np.diag(np.asarray(link.body.M_e)), link.first):
+            size = np.sqrt(stiffness[k] * mass)
+            hertz, ratio = stiffness[k] / size / (2 * np.pi), damping[k] / (2 * size)
+            modes.append([robot.elastic_names[k], f"{hertz:.4g}", f"{ratio:.3g}"])
+    texts = []
+    if hinges:
+        columns = ["elastic coordinate", "spring [N m/rad]", "damper [N m s/rad]"]
+        texts.append(table(hinges, columns))
+    if modes:
+        columns = ["mode of a body", "frequency, frame held [Hz]", "damping ratio [-]"]
+        texts.append(table(modes, columns))
+    return "\n\n".join(texts)
 
 
 def frequency_table(robot: ElasticRobot) -> str:
