@@ -229,7 +229,7 @@ def test_asim_of_modal_members(robots):
     plain = eqx.filter_jit(FlexibleJointInverse().feedforward)(sagging, reference)
     # what is left lies along the stretched arm, where damping holds the correction back
     assert miss(plain) > 3e-3
-    assert miss(command) < 0.1 * miss(plain)
+    assert miss(command) < 0.15 * miss(plain)
     still = lambda r: r.structure_damping
     undamped = eqx.tree_at(still, robot, replace_fn=jnp.zeros_like)
     with pytest.raises(ValueError, match="`structure_damping` of `kr210` must be"):
