@@ -104,10 +104,10 @@ def simulate(robot: ElasticRobot):
         return new, None
 
     def block(x, t):
-        new, _ = jax.lax.scan(step, x, t + STEP * jnp.arange(KEPT))
+        new, _ = jax.lax.scan(step, x, t + STEP * jnp.arange(float(KEPT)))
         return new, x
 
-    times = STEP * KEPT * jnp.arange(round(DURATION / (STEP * KEPT)))
+    times = STEP * KEPT * jnp.arange(float(round(DURATION / (STEP * KEPT))))
     _, (eta, etad) = jax.lax.scan(block, (start, 0.0 * start), times)
     return times, eta, etad
 

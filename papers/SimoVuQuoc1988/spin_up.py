@@ -87,10 +87,10 @@ def simulate(body: ModalBody):
         return plus(mean, STEP), None
 
     def block(x, t):
-        new, _ = jax.lax.scan(step, x, t + STEP * jnp.arange(KEPT))
+        new, _ = jax.lax.scan(step, x, t + STEP * jnp.arange(float(KEPT)))
         return new, body.nodes.displacement(body.nodes.index("tip"), x[0])[:2]
 
-    times = STEP * KEPT * jnp.arange(round(END / (STEP * KEPT)))
+    times = STEP * KEPT * jnp.arange(float(round(END / (STEP * KEPT))))
     _, tip = jax.lax.scan(block, (rest, rest), times)
     return times, tip
 
