@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ._parts import Axis, Body, ElasticJoint, EndSlope, Offset, Part
+from ._parts import Axis, Body, ElasticJoint, EndSlope, FlexibleLink, Offset, Part
 
 
 def dh_link(
@@ -11,8 +11,9 @@ def dh_link(
     d: float,
     a: float,
     alpha: float,
-    body: Body,
+    body: Body | None,
     *,
+    member: FlexibleLink | None = None,
     hinges: tuple[ElasticJoint, ...] = (),
     slopes: tuple[EndSlope, ...] = (),
 ) -> list[Part]:
@@ -28,7 +29,9 @@ def dh_link(
         d: offset along z [m].
         a: length along x [m].
         alpha: twist about x [rad].
-        body: in the distal frame.
+        body: in the distal frame; a link with a flexible member may have none.
+        member: flexible part of the link, in the frame of the axis: from `base` to
+            `node` it must reach by a along x and by d along z.
         hinges: tilt joints or beam hinges, in the frame of the axis.
         slopes: end-slope joints.
     """
@@ -47,7 +50,12 @@ def dh_link(
         ]
     )
     parts: list[Part] = [Offset(rotation=turn), Axis(name), *hinges]
-    parts += [Offset((a, 0.0, d), twist), body]
+    if member is None:
+        parts.append(Offset((a, 0.0, d), twist))
+    else:
+        parts += [member, Offset(rotation=twist)]
+    if body is not None:
+        parts.append(body)
     if slopes:
         parts += [Offset(rotation=twist.T), *slopes, Offset(rotation=twist)]
     return parts

@@ -15,6 +15,7 @@ from ..dynamics import (
     assemble,
     dh_link,
 )
+from ._robot_members import member_of
 from ._robot_parts import (
     check_names,
     clamp_springs,
@@ -47,16 +48,19 @@ def load_robot(path: str | pathlib.Path) -> ElasticRobot:
     """
     content = load_toml(path)
     try:
-        return robot_from_table(content)
+        return robot_from_table(content, pathlib.Path(path).parent)
     except ValueError as error:
         raise ValueError(f"{path}: {' '.join(str(error).split())}") from None
 
 
-def robot_from_table(content: dict[str, Any]) -> ElasticRobot:
+def robot_from_table(
+    content: dict[str, Any], folder: str | pathlib.Path = "."
+) -> ElasticRobot:
     """Elastic robot of the content of a robot file.
 
     Args:
         content: the tables, as `tomllib` returns them.
+        folder: from which the names of SID files count.
 
     Raises:
         ValueError: as for `load_robot`.
@@ -70,7 +74,7 @@ def robot_from_table(content: dict[str, Any]) -> ElasticRobot:
     for k, axis in enumerate(axes):
         if axis["wrist_centre"]:
             parts.append(WristCentre())
-        parts += _link(axis, beams, f"axes[{k + 1}]")
+        parts += _link(axis, beams, f"axes[{k + 1}]", pathlib.Path(folder))
     counterbalance = data["counterbalance"]
     robot = assemble(
         data["name"],
@@ -90,15 +94,20 @@ def robot_from_table(content: dict[str, Any]) -> ElasticRobot:
     return with_payload_of(robot, data["payload"])
 
 
-def _link(axis, beams, where: str) -> list[Part]:
+def _link(axis, beams, where: str, folder: pathlib.Path) -> list[Part]:
     hinges, slopes = hinges_of(axis, beams, where)
+    member = member_of(axis, f"{where}.flexible", folder)
+    if axis["body"] is None and member is None:
+        raise ValueError(f"`{where}.body` is missing: add it")
+    body = Body(f"body of {axis['name']}", **axis["body"]) if axis["body"] else None
     return dh_link(
         axis["name"],
         np.deg2rad(axis["theta_deg"]),
         axis["d"],
         axis["a"],
         np.deg2rad(axis["alpha_deg"]),
-        Body(f"body of {axis['name']}", **axis["body"]),
+        body,
+        member=member,
         hinges=tuple(hinges),
         slopes=tuple(slopes),
     )

@@ -7,6 +7,7 @@ from ._toml import (
     array_of,
     choice,
     flag,
+    integer,
     named,
     not_negative,
     number,
@@ -106,6 +107,16 @@ MASS = {
         "xy, yz, xz [kg m^2]",
     ),
 }
+FLEXIBLE = table(
+    {
+        "file": Key(text, meaning="the path of the SID file, from the robot file on"),
+        "base": Key(text, meaning="the node at the axis"),
+        "tip": Key(text, meaning="the node that carries the next link"),
+        "modes": Key(integer, None),
+        "damping_ratio": Key(positive, None),
+        "dialect": Key(choice("FEMBS", "PY_SID", "MatMorembs", "FEMBeam"), None),
+    }
+)
 _AXIS = table(
     {
         "name": Key(text),
@@ -117,7 +128,8 @@ _AXIS = table(
         "zero_deg": Key(number, 0.0),
         "wrist_centre": Key(flag, False),
         "limits_deg": Key(_LIMITS),
-        "body": Key(table(MASS)),
+        "body": Key(table(MASS), None),
+        "flexible": Key(FLEXIBLE, None),
         "gear": Key(GEAR),
         "hinges": Key(array_of(HINGE), []),
     }

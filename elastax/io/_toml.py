@@ -115,6 +115,13 @@ def number(value, where) -> float:
     return float(value)
 
 
+def integer(value, where) -> int:
+    """A whole number."""
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise ValueError(f"`{where}` must be a whole number, but is {_shown(value)}")
+    return value
+
+
 def positive(value, where) -> float:
     """A number above zero."""
     result = number(value, where)

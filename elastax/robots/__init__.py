@@ -25,6 +25,10 @@ from ._manutec_r3 import (
     manutec_r3_friction as manutec_r3_friction,
     manutec_r3_plant as manutec_r3_plant,
 )
+from ._modal_manipulator import (
+    ladder_link as ladder_link,
+    modal_manipulator as modal_manipulator,
+)
 from ._named import (
     ARMS as ARMS,
     ROBOTS as ROBOTS,

@@ -13,6 +13,7 @@ from ._kr16 import kr16
 from ._kr210 import kr210
 from ._kr300 import kr300
 from ._manutec_r3 import manutec_r3
+from ._modal_manipulator import modal_manipulator
 from ._planar_2r import planar_2r
 from ._ur10e import ur10e
 
@@ -25,6 +26,7 @@ ROBOTS = {
     "kr300": kr300,
     "kr16": kr16,
     "manutec_r3": manutec_r3,
+    "modal_manipulator": modal_manipulator,
 }
 # records of arms without dynamics
 ARMS: dict[str, Callable[[], Arm]] = {

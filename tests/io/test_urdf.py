@@ -197,6 +197,8 @@ def test_limits_of_a_negative_sign_swap():
 # keys of the robot file that the URDF replaces, and of cylinders, shown there
 ELSEWHERE = {"theta_deg", "alpha_deg", "d", "a", "base", "body", "lower", "upper"}
 ELSEWHERE |= {"velocity", "pressure", "volume", "piston_diameter", "rod_diameter"}
+# flexible links, which a URDF has no place for
+ELSEWHERE |= {"flexible", "modes", "damping_ratio", "dialect"}
 
 
 def test_example_shows_every_key():
