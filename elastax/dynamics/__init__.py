@@ -14,6 +14,7 @@ from ._closed_loop import (
     AbstractMotorController as AbstractMotorController,
     ControllerMemory as ControllerMemory,
     LoopState as LoopState,
+    loop_rates as loop_rates,
 )
 from ._command import (
     CommandInterpolant as CommandInterpolant,
@@ -34,6 +35,7 @@ from ._equilibrium import (
     static_equilibrium as static_equilibrium,
     static_load as static_load,
 )
+from ._gear_loads import resting_loads as resting_loads
 from ._lagrange import lagrange_forces as lagrange_forces
 from ._linearised import body_accelerations as body_accelerations
 from ._modal_links import ModalLink as ModalLink

@@ -145,7 +145,7 @@ def driven(robot: ElasticRobot, controller, setpoint: MotorSetpoint, x: State, m
 
 
 @kernel
-def rates(
+def loop_rates(
     robot: ElasticRobot,
     controller: AbstractMotorController,
     setpoint: MotorSetpoint,

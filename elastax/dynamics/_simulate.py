@@ -12,8 +12,8 @@ from .._kernel import kernel
 from ._closed_loop import (
     AbstractMotorController,
     LoopState,
+    loop_rates,
     observe,
-    rates,
     state_shapes,
 )
 from ._command import CommandInterpolant, MotorCommand, MotorSetpoint
@@ -138,7 +138,7 @@ def simulate(
         )
 
     def vector_field(t, x, _):
-        return rates(robot, controller, setpoint(t), x)
+        return loop_rates(robot, controller, setpoint(t), x)
 
     start = resting_loop(robot, setpoint(times[0]), controller)
     if robot.drives.switches:

@@ -8,7 +8,13 @@ from jaxtyping import Array, Bool, Float
 from .._custom_types import PerJoint, Scalar
 from .._kernel import kernel
 from ..drivetrain import AbstractSwitchingBranch
-from ._closed_loop import AbstractMotorController, State, driven, rates, state_parts
+from ._closed_loop import (
+    AbstractMotorController,
+    State,
+    driven,
+    loop_rates,
+    state_parts,
+)
 from ._command import MotorSetpoint
 from ._robot import ElasticRobot
 from ._switching import AbstractSwitchingSystem
@@ -34,7 +40,7 @@ class SwitchingLoop(AbstractSwitchingSystem):
 
     def rates(self, t: Scalar, x: State, mode: PerJoint) -> State:
         setpoint = self.setpoint(t)
-        return rates(self.robot, self.controller, setpoint, x, self._given(mode))
+        return loop_rates(self.robot, self.controller, setpoint, x, self._given(mode))
 
     def _given(self, mode: PerJoint) -> PerJoint | None:
         return mode if self.robot.drives.sticks else None

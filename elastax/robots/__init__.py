@@ -37,4 +37,5 @@ from ._named import (
 )
 from ._planar_2r import planar_2r as planar_2r
 from ._quanser_2dsfl import quanser_2dsfl as quanser_2dsfl
+from ._simplified_kr210 import simplified_kr210 as simplified_kr210
 from ._ur10e import ur10e as ur10e

@@ -43,6 +43,7 @@ def beam_on_joint(
     tip_mass: float = 0.5,
     beam: UniformBeam = ROD,
     support: AbstractSupport = SupportedFree(),
+    loaded_modes: bool = True,
     outputs: tuple[float, ...] = (),
     gravity=(0.0, 0.0, 0.0),
 ) -> ElasticRobot:
@@ -56,6 +57,8 @@ def beam_on_joint(
         tip_mass: point mass at the end [kg].
         beam: uniform beam.
         support: of the modes; those of a supported beam as in the text.
+        loaded_modes: whether the modes are those of the beam with its tip mass; else of
+            the bare beam, to whose end a point mass is attached, as in the text.
         outputs: further nodes, as fractions of the length.
         gravity: [m/s^2].
 
@@ -63,8 +66,9 @@ def beam_on_joint(
         [Reiner2010] section 3.5.1, figure 3.3; the text gives no parameters, all are
         assumed.
     """
-    body = _bending_beam(beam, modes, tip_mass, support, outputs)
+    body = _bending_beam(beam, modes, loaded_modes * tip_mass, support, outputs)
     parts: list[Part] = [Axis("A1"), _link("beam", body, support)]
+    parts += _load(0.0 if loaded_modes else tip_mass, "load")
     return _assembled("beam_on_joint", parts, 1, gravity)
 
 
@@ -74,6 +78,7 @@ def two_beams(
     tip_mass: float = 0.5,
     beam: UniformBeam = ROD,
     support: AbstractSupport = SupportedFree(),
+    loaded_modes: bool = True,
     outputs: tuple[float, ...] = (),
     gravity=(0.0, -9.81, 0.0),
 ) -> ElasticRobot:
@@ -84,6 +89,8 @@ def two_beams(
         tip_mass: point mass at the end of each beam [kg].
         beam: both beams.
         support: of the modes.
+        loaded_modes: whether the modes are those of the beam with its tip mass; else of
+            the bare beam, to whose end a point mass is attached, as in the text.
         outputs: further nodes of both, as fractions of the length.
         gravity: [m/s^2].
 
@@ -91,12 +98,15 @@ def two_beams(
         [Reiner2010] section 3.5.1, figure 3.6; the text gives no parameters, all are
         assumed.
     """
-    body = _bending_beam(beam, modes, tip_mass, support, outputs)
+    body = _bending_beam(beam, modes, loaded_modes * tip_mass, support, outputs)
+    apart = 0.0 if loaded_modes else tip_mass
     parts: list[Part] = [
         Axis("A1"),
         _link("first", body, support),
+        *_load(apart, "first load"),
         Axis("A2"),
         _link("second", body, support),
+        *_load(apart, "second load"),
     ]
     return _assembled("two_beams", parts, 2, gravity)
 
@@ -162,6 +172,11 @@ def _bending_beam(beam, modes, tip_mass, support, outputs):
         damping_ratio=DAMPING_RATIO,
         nodes=outputs,
     )
+
+
+def _load(mass: float, name: str) -> list[Part]:
+    """A point mass at the current frame, or nothing."""
+    return [Body(name, mass, np.zeros(3), np.zeros((3, 3)))] if mass else []
 
 
 def _link(name: str, body, support: AbstractSupport) -> FlexibleLink:

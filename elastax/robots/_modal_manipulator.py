@@ -151,7 +151,7 @@ def modal_manipulator(
             "all numbers; the text has none",
             "link: aluminium ladder of 0.8 m, rails and rungs 40 x 50 x 3 mm; beam: "
             f"aluminium tube 50 x 3 mm of 0.8 m with {load:g} kg at its end",
-            "hubs of 10 and 3 kg behind the axes 2 and 3, motor of 8 kg in front of axis 3",
+            "hubs of 10 and 3 kg behind the axes 2 and 3, motor of 8 kg in front of 3",
             "gears 100:1 with 6e4, 6e4, 2e4 N m/rad, damping 1 ms times that, linear "
             "friction; damping ratio of the modes 0.01",
         ),

@@ -61,7 +61,7 @@ def beam_frame(
         y = y / np.linalg.norm(y)
         turn = np.kron(np.eye(4), np.stack([x, y, np.cross(x, y)]))
         place = np.concatenate([6 * i + np.arange(6), 6 * j + np.arange(6)])
-        here = np.ix_(place, place)
+        here = (place[:, None], place[None])
         mass[here] += turn.T @ _mass(section, material, length, rotary_inertia) @ turn
         stiffness[here] += turn.T @ _stiffness(section, material, length) @ turn
         frames.append((place, turn, length))
@@ -69,8 +69,8 @@ def beam_frame(
         if not weight >= 0:
             raise ValueError(f"the mass at node {node} must not be negative")
         at = 6 * node + np.arange(6)
-        mass[np.ix_(at[:3], at[:3])] += weight * np.eye(3)
-        mass[np.ix_(at[3:], at[3:])] += np.asarray(inertia, float)
+        mass[at[:3, None], at[None, :3]] += weight * np.eye(3)
+        mass[at[3:, None], at[None, 3:]] += np.asarray(inertia, float)
     stiffness = stiffness.tocsc()
     axial = float(material.young * section.area)
 
@@ -83,7 +83,9 @@ def beam_frame(
         for place, turn, length in frames:
             local = turn @ moved[place]
             force = axial * (local[6] - local[0]) / length
-            total[np.ix_(place, place)] += force * (turn.T @ _geometry(length) @ turn)
+            total[place[:, None], place[None]] += force * (
+                turn.T @ _geometry(length) @ turn
+            )
         return total.tocsc()
 
     return FiniteElementModel(
@@ -117,8 +119,8 @@ def _bent(matrix: np.ndarray, pairs) -> np.ndarray:
     """Bending matrices of both planes in place, each times its factor."""
     total = np.zeros((12, 12))
     first, second = pairs
-    total[np.ix_(_XY, _XY)] = first * matrix
-    total[np.ix_(_XZ, _XZ)] = second * matrix * np.outer(_SIGN, _SIGN)
+    total[_XY[:, None], _XY[None]] = first * matrix
+    total[_XZ[:, None], _XZ[None]] = second * matrix * np.outer(_SIGN, _SIGN)
     return total
 
 

@@ -68,7 +68,7 @@ class BodyNodes(eqx.Module):
             )
         return self.names.index(name)
 
-    def displacement(self, index: int, eta: Float[Array, " modes"]) -> Vector3:
+    def displacement(self, index, eta: Float[Array, " modes"]) -> Vector3:
         """Displacement of a node [m].
 
         References:
@@ -77,7 +77,7 @@ class BodyNodes(eqx.Module):
         curved = self.phi[index] + 0.5 * self.phi_1[index] @ eta
         return curved @ eta
 
-    def rotation(self, index: int, eta: Float[Array, " modes"]) -> Matrix3:
+    def rotation(self, index, eta: Float[Array, " modes"]) -> Matrix3:
         r"""Small rotation of a node, $1 + \tilde\vartheta$."""
         x, y, z = self.psi[index] @ eta
         one = jnp.ones_like(x)
