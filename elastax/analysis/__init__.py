@@ -55,6 +55,11 @@ from ._robot_model import (
     RobotChannel as RobotChannel,
     linear_robot as linear_robot,
 )
+from ._robot_system import robot_system as robot_system
+from ._sensitivity import (
+    Sensitivity as Sensitivity,
+    sensitivities as sensitivities,
+)
 from ._transmission_zeros import transmission_zeros as transmission_zeros
 from ._zero_dynamics import (
     ZeroDynamics as ZeroDynamics,

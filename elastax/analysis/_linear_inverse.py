@@ -176,7 +176,7 @@ def high_gain_condition(model: LinearModel) -> HighGainCondition:
         high_frequency_gain=jnp.asarray(float(decoupling[0, 0])),
         centroid=jnp.asarray(centroid),
         degree=degree,
-        right_zeros=int(np.sum(zeros.real >= 0)),
+        right_zeros=int(np.sum(np.real(zeros) >= 0)),
     )
 
 

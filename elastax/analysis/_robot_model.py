@@ -141,7 +141,7 @@ def linear_robot(
             "a linear model needs smooth drive trains, but these have parts that "
             "switch: take their smooth counterparts"
         )
-    robot = _with_linear_friction(robot, channel.speed)
+    robot = with_linear_friction(robot, channel.speed)
     theta = jnp.asarray(theta)
     q, eta = static_equilibrium(robot, theta)
     _check_rest(robot, q, eta)
@@ -168,7 +168,7 @@ def linear_robot(
     return LinearModel(A, B, C, D, names, point)
 
 
-def _with_linear_friction(robot: ElasticRobot, speed) -> ElasticRobot:
+def with_linear_friction(robot: ElasticRobot, speed) -> ElasticRobot:
     """Friction as viscous, with the slope that it has at a speed [N m s/rad]."""
     one = jnp.ones((robot.axes,))
     none = jnp.zeros((robot.axes,))

@@ -1,4 +1,4 @@
-"""The command line: `elastax feedforward`, `elastax info`.
+"""The command line: `elastax feedforward`, `elastax analyse`, `elastax info`.
 
 Exit status 0: done, 1: a gate failed, 2: bad input, with one line that says what to
 change.
@@ -6,7 +6,7 @@ change.
 
 import sys
 
-from ._arguments import FeedforwardConfig, parse
+from ._arguments import AnalyseConfig, FeedforwardConfig, parse
 from ._progress import Progress
 
 
@@ -23,6 +23,10 @@ def main(argv: list[str] | None = None) -> int:
             from ._feedforward import feedforward
 
             return feedforward(config, progress)
+        if isinstance(config, AnalyseConfig):
+            from ._analyse import analyse
+
+            return analyse(config, progress)
         from ._info import info
 
         return info(config, progress)

@@ -72,7 +72,45 @@ class InfoConfig:
     quiet: bool = False
 
 
-def parse(argv: list[str] | None) -> tuple[str, FeedforwardConfig | InfoConfig]:
+@dataclasses.dataclass(frozen=True)
+class AnalyseConfig:
+    """What `elastax analyse` is to do; angles in degrees, as typed.
+
+    Attributes:
+        robot: built-in name, TOML file or URDF.
+        parts: TOML file of drive-train parts, or `None`.
+        pose: named pose or one angle per axis [deg].
+        payload: as for `feedforward`.
+        input: "torque" or "angle" of the motors.
+        axes: driven axes, from 1; the others are held.
+        output: "tool", "motor" or "joint": place of the tool, or angles of the axes.
+        directions: of the tool, of x, y, z.
+        hold: "locked" motors of the other axes, or a "cascade" that controls them.
+        grid: poses per direction of the map over A2 and A3, or `None`.
+        sensitivity: whether derivatives by every parameter are computed.
+        out: folder of the results.
+        quiet: whether progress is silent.
+    """
+
+    robot: str = "kr210"
+    parts: str | None = None
+    pose: tuple[str, ...] = ("stretched",)
+    payload: tuple[float, ...] | None = None
+    input: str = "torque"
+    axes: tuple[int, ...] = (1, 2, 3)
+    output: str = "tool"
+    directions: tuple[str, ...] = ("x", "y", "z")
+    hold: str = "locked"
+    grid: int | None = None
+    sensitivity: bool = False
+    out: str = "out/analyse"
+    quiet: bool = False
+
+
+Config = FeedforwardConfig | InfoConfig | AnalyseConfig
+
+
+def parse(argv: list[str] | None) -> tuple[str, Config]:
     """Command and configuration; ends the program with status 2 on unknown options."""
     parser = argparse.ArgumentParser(
         prog="elastax",
@@ -81,6 +119,7 @@ def parse(argv: list[str] | None) -> tuple[str, FeedforwardConfig | InfoConfig]:
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _add_feedforward(commands)
+    _add_analyse(commands)
     info = commands.add_parser(
         "info", help="a robot's kinematics, axes, springs, eigenfrequencies, sources"
     )
@@ -102,6 +141,8 @@ def parse(argv: list[str] | None) -> tuple[str, FeedforwardConfig | InfoConfig]:
     }
     if command == "info":
         return command, InfoConfig(**values)
+    if command == "analyse":
+        return command, AnalyseConfig(**values)
     return command, FeedforwardConfig(**values)
 
 
@@ -209,4 +250,82 @@ def _add_feedforward(commands) -> None:
     )
     add("--out", default=default.out, metavar="DIR", help="folder of the results")
     add("--seed", type=int, default=default.seed, help="kept in the results")
+    add("--quiet", action="store_true", help="no progress")
+
+
+def _add_analyse(commands) -> None:
+    default = AnalyseConfig()
+    parser = commands.add_parser(
+        "analyse",
+        help="eigenfrequencies, poles, zeros and zero dynamics at a pose or over poses",
+        description="Linear model of a robot at rest: modes, poles, transmission "
+        "zeros, relative degree, and whether an exact inverse is stable. Without "
+        "options: kr210 stretched, from the motor torques of A1 to A3 to the place of "
+        "the tool.",
+        allow_abbrev=False,
+    )
+    add = parser.add_argument
+    add("--robot", default=default.robot, metavar="NAME|FILE", help="the robot")
+    add("--parts", metavar="FILE.toml", help="other parts in the drive trains")
+    add(
+        "--pose",
+        nargs="+",
+        default=list(default.pose),
+        metavar="POSE",
+        help="named pose, or one angle per axis [deg]",
+    )
+    add(
+        "--payload",
+        nargs="+",
+        type=float,
+        metavar="NUMBER",
+        help="as for feedforward; 0 takes the payload off",
+    )
+    add(
+        "--input",
+        choices=("torque", "angle"),
+        default=default.input,
+        help="of the motors; angle: a stiff position loop imposes it",
+    )
+    add(
+        "--axes",
+        nargs="+",
+        type=int,
+        default=list(default.axes),
+        metavar="N",
+        help="driven axes, from 1",
+    )
+    add(
+        "--output",
+        choices=("tool", "motor", "joint"),
+        default=default.output,
+        help="place of the tool, or angles of the driven axes",
+    )
+    add(
+        "--directions",
+        nargs="+",
+        choices=("x", "y", "z"),
+        default=list(default.directions),
+        help="of the tool",
+    )
+    add(
+        "--hold",
+        choices=("locked", "cascade"),
+        default=default.hold,
+        help="what holds the motors of the other axes",
+    )
+    add(
+        "--grid",
+        nargs="?",
+        type=int,
+        const=64,
+        metavar="N",
+        help="maps over N x N poses of A2 and A3 within their limits",
+    )
+    add(
+        "--sensitivity",
+        action="store_true",
+        help="derivatives of zero and frequency by every parameter",
+    )
+    add("--out", default=default.out, metavar="DIR", help="folder of the results")
     add("--quiet", action="store_true", help="no progress")

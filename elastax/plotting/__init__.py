@@ -1,4 +1,4 @@
-"""Figures of runs, pose grids, recordings and perturbed models.
+"""Figures of runs, pose grids, recordings, perturbed models, poles and zeros.
 
 Every function takes data and returns a matplotlib `Figure` with its own canvas: no
 window, no global state. Angles come in radians, lengths in metres; the axes say what
@@ -33,4 +33,14 @@ from ._style import save_figure as save_figure
 from ._workspace import (
     plot_dexterity_section as plot_dexterity_section,
     plot_reach_section as plot_reach_section,
+)
+from ._zero_maps import (
+    plot_frequency_map as plot_frequency_map,
+    plot_zero_map as plot_zero_map,
+    plot_zeros_along_link as plot_zeros_along_link,
+)
+from ._zeros import (
+    plot_bode as plot_bode,
+    plot_nyquist as plot_nyquist,
+    plot_poles_and_zeros as plot_poles_and_zeros,
 )

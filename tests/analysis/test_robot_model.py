@@ -9,25 +9,27 @@ import numpy as np
 import pytest
 from elastax.analysis import (
     BodyPoint,
-    ControlSystem,
     JointEncoder,
     MotorAngles,
     MotorEncoder,
     MotorTorques,
     RobotChannel,
     SensorGroup,
-    SignalNames,
     ToolPosition,
     linear_robot,
+    linearise,
     locked_frequencies,
+    pose_figures,
     relative_degree,
+    robot_system,
+    sensitivities,
     transmission_zeros,
     zero_dynamics,
     zero_map,
 )
 from elastax.control import CascadeMotorControl
 from elastax.drivetrain import Motor
-from elastax.dynamics import forward_dynamics, static_equilibrium
+from elastax.dynamics import static_equilibrium
 from elastax.io import load_robot
 from elastax.kinematics import forward_kinematics
 from elastax.robots import simplified_kr210
@@ -179,28 +181,32 @@ def test_sensors(robot):
     assert_close(model.operating_point.y[1], q[2], rtol=1e-9)
 
 
+def test_nonlinear_system_has_the_same_linear_model(robot, by_torque):
+    """`linearise` of the system of states at the same equilibrium; and in motion."""
+    system = robot_system(robot)
+    q, eta = static_equilibrium(robot, THETA)
+    still = jnp.zeros_like
+    x = jnp.concatenate([q, eta, THETA, still(q), still(eta), still(q)])
+    model = jax.jit(lambda x, u: linearise(system, x, u))(
+        x, by_torque.operating_point.u
+    )
+    assert model.names == by_torque.names
+    size = np.abs(np.asarray(model.A)).max()
+    assert_close(model.A, by_torque.A, rtol=1e-9, atol=1e-12 * size)
+    assert_close(model.operating_point.rate, still(x), rtol=0, atol=1e-6)
+    moving = x.at[9:].set(0.3)
+    there = jax.jit(lambda x, u: linearise(system, x, u))(
+        moving, by_torque.operating_point.u
+    )
+    assert np.abs(np.asarray(there.A - model.A)).max() > 1e-3
+
+
 # ------------------------------------------------------------------- simplified KR210
 
 
 @pytest.fixture(scope="module")
 def simplified():
     return simplified_kr210()
-
-
-def nonlinear(robot):
-    """The same robot as a nonlinear system, from its forward dynamics."""
-
-    def rate(x, u):
-        q, eta, qd, etad = x[:1], x[1:2], x[2:3], x[3:]
-        qdd, etadd, _ = forward_dynamics(robot, q, eta, q, qd, etad, qd, u)
-        return jnp.concatenate([qd, etad, qdd, etadd])
-
-    def output(x):
-        coordinates = robot.joint_coordinates(x[:1], x[1:2])
-        return forward_kinematics(robot.chain, coordinates)[1:2, 3]
-
-    names = SignalNames(("q", "tilt", "q'", "tilt'"), ("tau",), ("y",))
-    return ControlSystem(rate, output, names)
 
 
 @pytest.mark.slow
@@ -210,12 +216,12 @@ def test_simplified_kr210_by_three_routes(simplified):
     Lie derivatives in the strict normal form, the constrained vector field, and the
     transmission zeros of the linear model.
     """
-    system = nonlinear(simplified)
+    channel = RobotChannel(MotorTorques((0,)), ToolPosition((1,)))
+    system = robot_system(simplified, channel)
     assert relative_degree(system, jnp.zeros(4)).degrees == (2,)
     held = zero_dynamics(system, jnp.zeros(4))
     assert held.is_unstable
     strict = eqx.filter_jit(lambda form: form.straightened_matrix())(held.form)
-    channel = RobotChannel(MotorTorques((0,)), ToolPosition((1,)))
     zeros = linear(simplified, jnp.zeros(1), channel).zeros()
     assert_close(held.eigenvalues, zeros, rtol=1e-8)
     assert_close(np.sort(np.linalg.eigvals(strict).real), zeros.real, rtol=1e-8)
@@ -283,6 +289,59 @@ def test_map_equals_single_models(robot):
     assert_close(found.figures.right_zeros, counts.astype(float), rtol=0)
     assert found.unstable == int(np.sum(counts > 0))
     assert found.masked == 0
+
+
+def test_poses_and_payloads_in_one_call(robot):
+    """One program over payloads and poses; a heavier load swings more slowly."""
+    locked = RobotChannel(MotorAngles((0, 1, 2)))
+
+    def at(mass, pose):
+        loaded = robot.with_payload(mass, jnp.array([0.0, 0.0, 0.1]), 0.02 * jnp.eye(3))
+        theta = loaded.from_maker(pose)
+        return pose_figures(loaded, theta, locked, RobotChannel(), (3, 3, 3))
+
+    masses = jnp.array([0.5, 5.0, 15.0])
+    poses = jnp.array([[0.2, -0.4, 0.7], [0.0, 0.3, 1.1]])
+    inner = jax.vmap(at, in_axes=(None, 0))
+    found = jax.jit(jax.vmap(inner, in_axes=(0, None)))(masses, poses)
+    assert found.zeros.shape == (3, 2, 9)
+    assert np.all(np.diff(np.asarray(found.frequency), axis=0) < 0)
+
+
+@pytest.mark.slow
+def test_sensitivities_against_differences(robot):
+    """Of frequency and right zero by one parameter of every kind."""
+    theta = robot.from_maker(jnp.array([-0.65, 0.73, 0.08]))  # with a right zero
+    found = sensitivities(robot, theta, degrees=(3, 3, 3))
+    names = {s.name: s for s in found}
+    sizes = [max(abs(s.frequency), abs(s.zero)) for s in found]
+    assert sizes == sorted(sizes, reverse=True)
+    locked = RobotChannel(MotorAngles((0, 1, 2)))
+    figures = eqx.filter_jit(
+        lambda r: pose_figures(r, theta, locked, RobotChannel(), (3, 3, 3))
+    )
+    places = {
+        "drives.stiffness.linear[A2]": (lambda r: r.drives.stiffness.linear, 1),
+        "structure_stiffness.linear[tilt 1 y]": (
+            lambda r: r.structure_stiffness.linear,
+            1,
+        ),
+        "payload.mass[payload]": (lambda r: r.payload.mass, 0),
+    }
+    h = 1e-4
+    for name, (where, index) in places.items():
+        ends = [
+            figures(
+                eqx.tree_at(where, robot, where(robot).at[index].multiply(1.0 + step))
+            )
+            for step in (h, -h)
+        ]
+        for field, value in (
+            ("frequency", names[name].frequency),
+            ("slowest_right", names[name].zero),
+        ):
+            up, down = (float(getattr(end, field)) for end in ends)
+            assert_close((up - down) / (h * (up + down)), value, rtol=1e-4, atol=1e-6)
 
 
 # -------------------------------------------------------------------------- refusals

@@ -1,0 +1,106 @@
+"""`elastax analyse`: a small robot, its results, bad input; the KR210's map."""
+
+import json
+import pathlib
+import time
+
+import jax
+import numpy as np
+import pytest
+from elastax.cli import main
+
+
+EXAMPLE = pathlib.Path(__file__).parents[2] / "examples" / "robot.toml"
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(monkeypatch):
+    # the tests' own compilation cache stays in place
+    monkeypatch.setenv(
+        "JAX_COMPILATION_CACHE_DIR", str(jax.config.jax_compilation_cache_dir)
+    )
+
+
+def run(tmp_path, *words):
+    return main(["analyse", "--quiet", "--out", str(tmp_path / "out"), *words])
+
+
+def test_small_robot_with_map(tmp_path, capsys):
+    words = ["--robot", str(EXAMPLE), "--pose", "20", "-30", "50", "--grid", "5"]
+    assert run(tmp_path, *words) == 0
+    printed = capsys.readouterr().out
+    assert "mode [Hz]" in printed and "zero, real [1/s]" in printed
+    assert "25 poses" in printed
+    folder = tmp_path / "out"
+    result = json.loads((folder / "result.json").read_text())
+    assert result["schema"] == "elastax.analyse/1"
+    assert result["infinite_zeros"] == [3, 3, 3]
+    assert len(result["zeros"]["real"]) == 9
+    grid = result["grid"]
+    assert grid["poses"] == 25
+    assert grid["with_right_zeros"] + grid["masked"] <= 25
+    for name in ("poles_and_zeros", "frequency_response", "zero_map", "frequency_map"):
+        assert (folder / f"{name}.png").stat().st_size > 5_000
+    arrays = np.load(folder / "arrays.npz")
+    assert arrays["A"].shape == (18, 18)
+    assert arrays["grid_frequency"].shape == (25,)
+    text = (folder / "report.html").read_text()
+    assert "Zeros over the workspace" in text
+
+
+def test_collocated_output_is_stable(tmp_path, capsys):
+    words = ["--robot", str(EXAMPLE), "--output", "motor", "--axes", "2"]
+    assert run(tmp_path, *words) == 0
+    assert "the exact inverse is stable" in capsys.readouterr().out
+
+
+def test_more_outputs_than_inputs(tmp_path, capsys):
+    words = ["--robot", str(EXAMPLE), "--axes", "1", "2"]
+    assert run(tmp_path, *words) == 0
+    assert "no inverse: the transfer matrix of 2 inputs and 3 outputs" in (
+        capsys.readouterr().out
+    )
+
+
+REFUSALS = [
+    (["--axes", "1", "9"], "--axes must be different numbers of 1 to 6"),
+    (["--grid", "1"], "--grid must be 2 or more poses"),
+    (["--pose", "up"], "--pose must be one of"),
+    (["--pose", "0", "90", "0", "0", "0", "0"], "outside its limits"),
+    (["--input", "angle", "--output", "motor"], "measures the input itself"),
+    (["--robot", "kr999"], "`kr999` is unknown"),
+    (["--payload", "10"], "--payload must give 7 numbers"),
+]
+
+
+@pytest.mark.parametrize(("words", "message"), REFUSALS)
+def test_bad_input(tmp_path, capsys, words, message):
+    assert run(tmp_path, *words) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+
+
+@pytest.mark.slow
+def test_map_of_the_kr210(tmp_path, capsys):
+    """4,096 poses; almost everywhere there is no stable inverse."""
+    start = time.perf_counter()
+    assert run(tmp_path, "--grid", "64") == 0
+    seconds = time.perf_counter() - start
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    grid = result["grid"]
+    assert grid["poses"] == 4096
+    assert grid["masked"] < 200
+    assert grid["with_right_zeros"] > 3800
+    low, _, high = grid["first_frequency"]
+    assert 4.0 < low < high < 10.0
+    print(f"{seconds:.0f} s")
+
+
+@pytest.mark.slow
+def test_sensitivity_and_cascade(tmp_path, capsys):
+    words = ["--robot", str(EXAMPLE), "--pose", "-37", "42", "5", "--sensitivity"]
+    assert run(tmp_path, *words) == 0
+    assert "% per %" in capsys.readouterr().out
+    held = ["--robot", str(EXAMPLE), "--hold", "cascade", "--axes", "2"]
+    assert run(tmp_path, *held, "--directions", "z") == 0
