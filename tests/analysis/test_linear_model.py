@@ -64,6 +64,20 @@ def test_accelerations_of_the_two_link(vector):
     )
 
 
+@pytest.mark.parametrize("vector", load_vectors("Reiner 3.27"))
+def test_printed_zero_dynamics_of_the_kr210(vector):
+    """(3.26) with the printed constants, 4.393e-4 read as a power of ten."""
+    given = vector["inputs"]
+    C_1, C_2, C_3 = (given[name] for name in ("C1", "C2", "C3"))
+    A = [[0.0, C_1], [C_3 * given["c_e"], C_2 * given["d_e"]]]
+    poles = LinearModel(A, np.ones((2, 1)), np.ones((1, 2))).poles()
+    expected = np.array(vector["outputs"]["eigenvalues"], complex)
+    assert_close(poles, expected, rtol=vector["tol"])
+    assert_close(C_1 * C_3, vector["outputs"]["C1C3"], rtol=vector["tol"])
+    # the structure s^2 - K (d s + c), to the printed digits of C_2
+    assert_close(C_1 * C_3, C_2, rtol=1e-3)
+
+
 # ------------------------------------------------------------------ poles and modes
 
 
