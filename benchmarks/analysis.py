@@ -148,8 +148,8 @@ def markdown(header: dict, rows: list[dict], mapped: dict | None) -> str:
         "",
         f"{header['date']}, {header['machine']['cpu']}, {header['machine']['cores']} "
         f"cores, jax {header['versions']['jax']}, float64. KR210, motor torques of A1 "
-        f"to A3 to x, y, z of the tool, 34 states. Scan and vmap over {POSES} poses, time "
-        "per pose; derivatives at one pose by all parameters of the robot.",
+        f"to A3 to x, y, z of the tool, 34 states. Scan and vmap over {POSES} poses, "
+        "time per pose; derivatives at one pose by all parameters of the robot.",
         "",
         "| function | single [us] | scan [us] | vmap [us] | forward derivative [us] | "
         "reverse gradient [us] | compile [s] |",

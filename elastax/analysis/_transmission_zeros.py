@@ -82,24 +82,27 @@ def _tangent(degrees, primals, tangents):
 
     def move(z):
         off = _OFF * (jnp.abs(z) + 1e-6 * largest + jnp.finfo(largest.dtype).tiny)
-        pencil = whole - (z + off.astype(z.dtype)) * identity
-        x = _null_vector(pencil)
-        y = _null_vector(pencil.conj().T)
+        factors = jax.scipy.linalg.lu_factor(
+            whole - (z + off.astype(z.dtype)) * identity
+        )
+        x = _null_vector(factors, 0, jnp.zeros_like(z))
+        # one after the other: batched solves at the same time can wait for each other
+        y = _null_vector(factors, 2, 0.0 * x[0])
         weight = y.conj()[:, None] * x[None] / (y[:n].conj() @ x[:n])
         real, imaginary = jnp.sum(weight.real * change), jnp.sum(weight.imag * change)
         return jax.lax.complex(real, imaginary)
 
-    return zeros, jax.vmap(move)(zeros)
+    return zeros, jax.lax.map(move, zeros)
 
 
-def _null_vector(matrix):
+def _null_vector(factors, transposed: int, start):
     """By inverse iteration from a vector that is hardly ever orthogonal to it."""
-    factors = jax.scipy.linalg.lu_factor(matrix)
-    size = matrix.shape[0]
-    x = jnp.cos(1.0 + jnp.arange(size, dtype=matrix.real.dtype)).astype(matrix.dtype)
+    size, kind = factors[0].shape[0], factors[0].dtype
+    x = jnp.cos(1.0 + jnp.arange(size, dtype=factors[0].real.dtype)).astype(kind)
+    x = x + start
     for _ in range(_ITERATIONS):
-        x = jax.scipy.linalg.lu_solve(factors, x)
-        x = x / jnp.linalg.norm(x).astype(x.dtype)
+        x = jax.scipy.linalg.lu_solve(factors, x, trans=transposed)
+        x = x / jnp.linalg.norm(x).astype(kind)
     return x
 
 

@@ -56,6 +56,9 @@ def pose_figures(
 ) -> PoseFigures:
     """Figures of one pose; jittable, vmapped over poses and robots.
 
+    Its eigenvalues and factorisations are computed one after the other: on a processor,
+    batched ones at the same time can wait for each other for ever (jaxlib 0.10).
+
     Args:
         robot: the robot.
         theta: motor angles at rest [rad].
@@ -65,16 +68,17 @@ def pose_figures(
         singular: below which a decoupling matrix counts as singular.
     """
     model = linear_robot(robot, theta, channel)
-    still = linear_robot(robot, theta, locked).poles()
     zeros = transmission_zeros(model.A, model.B, model.C, model.D, degrees)
+    still = linear_robot(robot, _after(theta, zeros), locked).poles()
     swinging = still.imag > 0
     size = jnp.where(swinging, jnp.abs(still), jnp.inf)
     first = jnp.argmin(size)
-    share = conditioning(model, degrees)
+    matrices = _after((model.A, model.B, model.C, model.D), still)
+    share = conditioning(LinearModel(*matrices, names=model.names), degrees)
     right = zeros.real > 1e-9 * jnp.max(jnp.abs(zeros), initial=0.0)
     return PoseFigures(
         zeros=zeros,
-        poles=model.poles(),
+        poles=LinearModel(_after(model.A, share), model.B, model.C).poles(),
         largest_real=jnp.max(zeros.real, initial=-jnp.inf),
         right_zeros=jnp.sum(right).astype(size.dtype),
         slowest_right=jnp.min(jnp.abs(zeros), where=right, initial=jnp.inf),
@@ -83,6 +87,11 @@ def pose_figures(
         decoupling=share,
         regular=share > singular,
     )
+
+
+def _after(values, earlier):
+    """The values, not before something else is known."""
+    return jax.lax.optimization_barrier((values, earlier))[0]
 
 
 def conditioning(model: LinearModel, degrees: tuple[int, ...]):
@@ -142,9 +151,9 @@ def zero_map(
 ) -> ZeroMap:
     """Zeros, first frequency and damping over poses.
 
-    One compiled program runs over batches of poses. The relative degrees are told at
-    the first regular pose and hold for all; poses at which the decoupling matrix is
-    singular are marked.
+    One compiled program runs over batches of poses, one pose after the other. The
+    relative degrees are told at the first regular pose and hold for all; poses at which
+    the decoupling matrix is singular are marked.
 
     Args:
         robot: the robot.
@@ -184,7 +193,8 @@ def _figures(robot, poses, locked, channel, degrees):
         theta = robot.from_maker(pose)
         return pose_figures(robot, theta, locked, channel, degrees)
 
-    return jax.vmap(at)(poses)
+    # one by one: on single matrices LAPACK never waits
+    return jax.lax.map(at, poses)
 
 
 def _degrees(robot: ElasticRobot, poses, channel: RobotChannel) -> tuple[int, ...]:
