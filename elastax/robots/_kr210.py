@@ -8,6 +8,9 @@ from ._arm_structure import AbstractArmStructure, HingedArm
 from ._kuka_arm import arm_parts
 
 
+BASE = (0.0, 0.0, 0.2256)  # of the first row's frame [m]
+
+
 def kr210(structure: AbstractArmStructure = HingedArm()) -> ElasticRobot:
     """KUKA KR210, 2.7 m reach, with a dumb-bell of 210 kg.
 
@@ -26,22 +29,10 @@ def kr210(structure: AbstractArmStructure = HingedArm()) -> ElasticRobot:
     Examples:
         >>> robot = kr210(ModalArm(ModeCounts(2, 2, 1)))
     """
-    right = np.pi / 2
-    # theta, d, a, alpha [rad, m]; base height .2256 in front
-    table = np.array(
-        [
-            [0.0, 0.4494, 0.350, -right],
-            [0.0, 0.0, 1.150, 0.0],
-            [right, 0.0, 0.041, -right],
-            [0.0, -1.2, 0.0, right],
-            [0.0, 0.0, 0.0, -right],
-            [np.pi, -0.215, 0.0, np.pi],
-        ]
-    )
     parts = [
-        Offset((0.0, 0.0, 0.2256)),
+        Offset(BASE),
         *arm_parts(
-            table,
+            denavit_hartenberg(),
             link_bodies(),
             bearing_stiffness=(
                 quantec.BEARING_STIFFNESS_1,
@@ -99,6 +90,21 @@ def kr210(structure: AbstractArmStructure = HingedArm()) -> ElasticRobot:
         ),
     )
     return robot.with_payload(210.0, load, np.diag([9.6, 3.8, 9.6]))
+
+
+def denavit_hartenberg() -> np.ndarray:
+    """Rows theta, d, a, alpha [rad, m], from the frame at `BASE` on."""
+    right = np.pi / 2
+    return np.array(
+        [
+            [0.0, 0.4494, 0.350, -right],
+            [0.0, 0.0, 1.150, 0.0],
+            [right, 0.0, 0.041, -right],
+            [0.0, -1.2, 0.0, right],
+            [0.0, 0.0, 0.0, -right],
+            [np.pi, -0.215, 0.0, np.pi],
+        ]
+    )
 
 
 def link_bodies() -> list[Body]:

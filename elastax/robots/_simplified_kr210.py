@@ -15,7 +15,7 @@ from ..dynamics import (
     assemble,
     dh_link,
 )
-from ._kr210 import kr210, link_bodies
+from ._kr210 import BASE, denavit_hartenberg, kr210, link_bodies
 
 
 # 1e-6 of the arm's inertia: the drive train counts as none
@@ -40,18 +40,9 @@ def simplified_kr210(
         [Reiner2010] section 3.3, figure 3.1, with c_e and d_e of the example; the text
         prints no geometry.
     """
-    right = np.pi / 2
-    table = [
-        [0.0, 0.4494, 0.350, -right],
-        [0.0, 0.0, 1.150, 0.0],
-        [right, 0.0, 0.041, -right],
-        [0.0, -1.2, 0.0, right],
-        [0.0, 0.0, 0.0, -right],
-        [np.pi, -0.215, 0.0, np.pi],
-    ]
-    parts: list[Part] = [Offset((0.0, 0.0, 0.2256))]
-    for k, (row, body) in enumerate(zip(table, link_bodies())):
-        theta, d, a, alpha = row
+    parts: list[Part] = [Offset(BASE)]
+    for k, (row, body) in enumerate(zip(denavit_hartenberg(), link_bodies())):
+        theta, d, a, alpha = (float(x) for x in row)
         link = dh_link(f"A{k + 1}", theta, d, a, alpha, body)
         if k == 1:
             # the row leads to axis 2, whose frame has -y upward

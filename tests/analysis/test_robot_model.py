@@ -119,6 +119,7 @@ def test_static_gain_is_the_slope_of_the_equilibrium(robot, by_angle):
     assert_close(by_angle.operating_point.y, tool(THETA), rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_rigid_gears_by_torque_and_by_angle(robot):
     """Prescribed joints through the mass matrix have the zeros of the torques."""
     stiff = robot.rigid()
@@ -139,6 +140,7 @@ def test_rigid_gears_by_torque_and_by_angle(robot):
     assert rigid.zeros().size == 0
 
 
+@pytest.mark.slow
 def test_fewer_axes_locked_or_held(robot):
     """Locked motors are controllers of endless gain."""
     outputs = ToolPosition((2,))
@@ -159,6 +161,7 @@ def test_fewer_axes_locked_or_held(robot):
     sorted_match(linear(robot, THETA, by_angle).zeros(), soft.zeros(), 1e-6)
 
 
+@pytest.mark.slow
 def test_lag_of_the_motors_adds_a_degree_and_no_zero(robot, by_torque):
     inertia = np.asarray(robot.drives.motor.inertia)
     lag = robot.with_drives(motor=Motor(inertia, lag=np.full(3, 2e-3)))
@@ -169,6 +172,7 @@ def test_lag_of_the_motors_adds_a_degree_and_no_zero(robot, by_torque):
     sorted_match(angle.zeros(), by_torque.zeros(), 1e-6)
 
 
+@pytest.mark.slow
 def test_sensors(robot):
     """A group of sensors, and a point of the last body at the tool."""
     last = robot.chain.number - 1
@@ -181,6 +185,7 @@ def test_sensors(robot):
     assert_close(model.operating_point.y[1], q[2], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_nonlinear_system_has_the_same_linear_model(robot, by_torque):
     """`linearise` of the system of states at the same equilibrium; and in motion."""
     system = robot_system(robot)
@@ -253,6 +258,7 @@ def right_zero(simplified):
     return at
 
 
+@pytest.mark.slow
 def test_derivative_of_a_zero_by_spring_and_damper(right_zero):
     """Closed form: s^2 = K (d s + c) with K from the zero itself."""
     c, d = jnp.asarray(1e6), jnp.asarray(1e3)
@@ -291,6 +297,7 @@ def test_map_equals_single_models(robot):
     assert found.masked == 0
 
 
+@pytest.mark.slow
 def test_poses_and_payloads_in_one_call(robot):
     """One program over payloads and poses; a heavier load swings more slowly."""
     locked = RobotChannel(MotorAngles((0, 1, 2)))

@@ -86,6 +86,7 @@ def test_textbook_system(name):
     assert words.get(case.verdict, f"{case.verdict} zero dynamics") in found.verdict
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_linearised_system_has_the_same_zeros(name):
     """The second route: QZ of the system matrix at the equilibrium."""
@@ -153,6 +154,7 @@ def test_no_input_moves_straightened_coordinates(two_link_form):
     assert np.all(np.abs((slope @ field)[:, 0]) < 1e-9 * np.asarray(size))
 
 
+@pytest.mark.slow
 def test_outputs_stay_at_zero(two_link_form):
     """Along the simulated zero dynamics, while the unstable mode grows."""
     form = two_link_form
@@ -166,6 +168,7 @@ def test_outputs_stay_at_zero(two_link_form):
     assert np.abs(np.asarray(outputs)).max() < 1e-6 * size
 
 
+@pytest.mark.slow
 def test_zero_dynamics_differentiate_by_parameters():
     """Of the planar VTOL they are +-1/sqrt(epsilon)."""
 

@@ -264,8 +264,17 @@ def critical(modes: int, ratio: float):
 
 
 @pytest.mark.parametrize("vector", load_vectors("Reiner 3.5.1 b"))
-@pytest.mark.parametrize("index", [0, 1, 2])
-@pytest.mark.parametrize("modes", [1, 3])
+@pytest.mark.parametrize(
+    ("modes", "index"),
+    [
+        (1, 0),
+        pytest.param(1, 1, marks=pytest.mark.slow),
+        pytest.param(1, 2, marks=pytest.mark.slow),
+        pytest.param(3, 0, marks=pytest.mark.slow),
+        (3, 1),
+        pytest.param(3, 2, marks=pytest.mark.slow),
+    ],
+)
 def test_critical_position_with_tip_mass(vector, index, modes):
     ratio = vector["inputs"]["mu"][index]
     expected = vector["outputs"][f"xi_crit_n{modes}"][index]

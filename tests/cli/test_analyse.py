@@ -48,12 +48,14 @@ def test_small_robot_with_map(tmp_path, capsys):
     assert "Zeros over the workspace" in text
 
 
+@pytest.mark.slow
 def test_collocated_output_is_stable(tmp_path, capsys):
     words = ["--robot", str(EXAMPLE), "--output", "motor", "--axes", "2"]
     assert run(tmp_path, *words) == 0
     assert "the exact inverse is stable" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_more_outputs_than_inputs(tmp_path, capsys):
     words = ["--robot", str(EXAMPLE), "--axes", "1", "2"]
     assert run(tmp_path, *words) == 0

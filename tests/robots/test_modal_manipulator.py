@@ -37,6 +37,7 @@ def test_coordinates(robot, frequencies):
     assert 2.0 < hertz[0] < 12.0
 
 
+@pytest.mark.slow
 def test_sag_against_the_frame_of_elements(robot):
     """Stretched and at rest, the tool sinks as the finite elements under the load do.
 
@@ -78,6 +79,7 @@ def _gear(drives):
     return drives.stiffness.linear
 
 
+@pytest.mark.slow
 def test_sid_file_in_place_of_the_elements(robot, tmp_path):
     path = tmp_path / "link.SID_FEM"
     # whole numbers are the only names that SID files keep
