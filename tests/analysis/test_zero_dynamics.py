@@ -87,7 +87,17 @@ def test_textbook_system(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        "three states",
+        "pendulum on a cart, cart",
+        "planar VTOL",
+        "quadruple tank, not minimum phase",
+        "boost converter, voltage",
+        "two by two, zero at 0.5",
+    ],
+)
 def test_linearised_system_has_the_same_zeros(name):
     """The second route: QZ of the system matrix at the equilibrium."""
     case = CASES[name]

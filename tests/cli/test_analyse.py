@@ -100,9 +100,7 @@ def test_map_of_the_kr210(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_sensitivity_and_cascade(tmp_path, capsys):
+def test_sensitivity(tmp_path, capsys):
     words = ["--robot", str(EXAMPLE), "--pose", "-37", "42", "5", "--sensitivity"]
     assert run(tmp_path, *words) == 0
     assert "% per %" in capsys.readouterr().out
-    held = ["--robot", str(EXAMPLE), "--hold", "cascade", "--axes", "2"]
-    assert run(tmp_path, *held, "--directions", "z") == 0

@@ -218,7 +218,7 @@ def test_mutated_files_are_read_or_refused_with_a_line(lines, tmp_path_factory, 
 
 
 @pytest.mark.slow
-@settings(max_examples=1000, deadline=None)
+@settings(max_examples=250, deadline=None)
 @given(data=st.data())
 def test_many_mutated_files(lines, tmp_path_factory, data):
     check_mutation(lines, tmp_path_factory.mktemp("mutated") / "bad.SID_FEM", data)
