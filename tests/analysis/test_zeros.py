@@ -263,6 +263,7 @@ def critical(modes: int, ratio: float):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vector", load_vectors("Reiner 3.5.1 b"))
 @pytest.mark.parametrize(
     ("modes", "index"),

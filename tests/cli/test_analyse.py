@@ -25,6 +25,7 @@ def run(tmp_path, *words):
     return main(["analyse", "--quiet", "--out", str(tmp_path / "out"), *words])
 
 
+@pytest.mark.slow
 def test_small_robot_with_map(tmp_path, capsys):
     words = ["--robot", str(EXAMPLE), "--pose", "20", "-30", "50", "--grid", "5"]
     assert run(tmp_path, *words) == 0

@@ -29,6 +29,7 @@ def frequencies():
     return jax.jit(locked_frequencies)
 
 
+@pytest.mark.slow
 def test_coordinates(robot, frequencies):
     """Ten modes of the link, three of the beam; soft enough to be seen."""
     assert (robot.axes, robot.elastic) == (3, 13)
@@ -97,6 +98,7 @@ def test_sid_file_in_place_of_the_elements(robot, tmp_path):
     assert_close(place(twin), place(robot), rtol=1e-9, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_refuses_another_length(robot):
     body = robot.modal_links[0].body
     nodes = dataclasses.replace(body.nodes, position=0.5 * body.nodes.position)

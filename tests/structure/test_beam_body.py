@@ -80,6 +80,7 @@ def test_modal_statics_approach_the_exact_tip():
     assert errors[2] < 1e-4
 
 
+@pytest.mark.slow
 def test_shortening_keeps_the_length():
     # a circle of small curvature: v' = x / R, shortening L^3 / (6 R^2)
     phi_1 = np.asarray(BODY.nodes.phi_1)[:, 0]

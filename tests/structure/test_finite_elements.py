@@ -74,6 +74,7 @@ def test_static_compliance_of_the_tip_is_exact():
     assert_close(compliance[here][2, 4], -exact[0, 0, 1], rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_body_against_the_analytic_beam():
     model = beam_line(BEAM, 40)
     body = modal_body(model, eigenmodes(model, 4, ["base"]), "base", nodes=["tip"])
