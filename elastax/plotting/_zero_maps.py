@@ -114,6 +114,7 @@ def plot_zeros_along_link(
     plane.plot(np.real(poles), np.imag(poles), "x", color=INK, ms=7, label="poles")
     plane.set_xlim(-limit, limit)
     plane.set_ylim(-limit, limit)
+    plane.locator_params(axis="x", nbins=5)  # labels of thousands are long
     plane.set_xlabel("real part [1/s]")
     plane.set_ylabel("imaginary part [rad/s]")
     plane.legend(fontsize=9, frameon=False, loc="upper left")
@@ -126,7 +127,8 @@ def plot_zeros_along_link(
         over.annotate(
             f"first right zero at {critical:.3f}",
             (critical, 0.97),
-            (5, 0),
+            (5 if critical < 0.6 else -5, 0),
+            ha="left" if critical < 0.6 else "right",
             xycoords=("data", "axes fraction"),
             textcoords="offset points",
             fontsize=9,

@@ -53,7 +53,10 @@ def main(path: pathlib.Path | None = None) -> dict[str, float]:
             print(f"{name:<28} {place:8.4f} {THEIRS[modes]:8.1f} {off:11.4f}")
             if path is not None and ratio == 0.25:
                 figure = plot_zeros_along_link(
-                    zeros, title=f"Figure 3.{4 if modes == 3 else 5}: {modes} modes"
+                    zeros,
+                    title="Figure 3.4: three modes"
+                    if modes == 3
+                    else "Figure 3.5: one mode",
                 )
                 here = path if modes == 3 else path.with_stem(path.stem + "_one_mode")
                 save_figure(figure, here)

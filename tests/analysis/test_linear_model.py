@@ -74,11 +74,13 @@ def test_printed_zero_dynamics_of_the_kr210(vector):
     expected = np.array(vector["outputs"]["eigenvalues"], complex)
     assert_close(poles, expected, rtol=vector["tol"])
     assert_close(C_1 * C_3, vector["outputs"]["C1C3"], rtol=vector["tol"])
-    # the structure s^2 - K (d s + c), to the printed digits of C_2
+    # the structure s^2 - K (d s + c): C_2 = 0.0244 is printed to three digits
     assert_close(C_1 * C_3, C_2, rtol=1e-3)
 
 
 # ------------------------------------------------------------------ poles and modes
+
+# tolerances of 1e-12 and 1e-14 in this file: rounding of the eigensolver, sizes of one
 
 
 def test_modes_of_an_oscillator():
