@@ -1,5 +1,6 @@
 """The machine and the versions that the figures belong to."""
 
+import datetime
 import importlib.metadata
 import os
 import pathlib
@@ -18,6 +19,15 @@ PACKAGES = (
     "mujoco-mjx",
     "roboticstoolbox-python",
 )
+
+
+def header() -> dict:
+    """Machine, versions and date, the head of every table."""
+    return {
+        "machine": machine(),
+        "versions": versions(),
+        "date": datetime.date.today().isoformat(),
+    }
 
 
 def machine() -> dict[str, str | int | float]:

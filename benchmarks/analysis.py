@@ -19,7 +19,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from elastax.analysis import (
-    MotorAngles,
     RobotChannel,
     linear_robot,
     pose_figures,
@@ -29,7 +28,7 @@ from elastax.analysis import (
 from elastax.dynamics import ElasticRobot
 from elastax.robots import kr210
 
-from ._machine import machine, versions
+from ._machine import header
 from ._timing import Effort, compile_timed, measure
 
 
@@ -37,7 +36,6 @@ EFFORT = Effort(least=0.2, repeats=5, budget=5.0)
 DEGREES = (3, 3, 3)
 POSES = 256
 CHANNEL = RobotChannel()
-LOCKED = RobotChannel(MotorAngles((0, 1, 2, 3, 4, 5)))
 
 
 def model(robot: ElasticRobot, pose):
@@ -55,7 +53,7 @@ def zeros(robot: ElasticRobot, pose):
 def figures(robot: ElasticRobot, pose):
     """Figures of a map at a pose."""
     theta = robot.from_maker(pose)
-    found = pose_figures(robot, theta, LOCKED, CHANNEL, DEGREES)
+    found = pose_figures(robot, theta, CHANNEL, DEGREES)
     return found.largest_real, found.frequency, found.damping_ratio
 
 
@@ -187,11 +185,7 @@ def main(argv: list[str] | None = None) -> int:
     options = parser.parse_args(argv)
     jax.config.update("jax_enable_x64", True)
     jax.config.update("jax_enable_compilation_cache", False)
-    header = {
-        "machine": machine(),
-        "versions": versions(),
-        "date": time.strftime("%Y-%m-%d"),
-    }
+    head = header()
     robot = kr210()
     draw = np.random.default_rng(0).uniform
     poses = np.zeros((POSES, 6))
@@ -203,10 +197,10 @@ def main(argv: list[str] | None = None) -> int:
         rows.append(row(name, robot, jnp.asarray(poses)))
         print(json.dumps(rows[-1]), flush=True)
     options.out.mkdir(parents=True, exist_ok=True)
-    content = json.dumps({**header, "rows": rows, "map": mapped}, indent=1)
+    content = json.dumps({**head, "rows": rows, "map": mapped}, indent=1)
     (options.out / "analysis.json").write_text(content + "\n")
-    (options.out / "ANALYSIS.md").write_text(markdown(header, rows, mapped))
-    print(markdown(header, rows, mapped))
+    (options.out / "ANALYSIS.md").write_text(markdown(head, rows, mapped))
+    print(markdown(head, rows, mapped))
     numbers = [v for found in rows for v in found.values() if isinstance(v, float)]
     return int(not np.all(np.isfinite(numbers)))
 

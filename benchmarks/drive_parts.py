@@ -13,7 +13,6 @@ import functools
 import json
 import pathlib
 import sys
-import time
 
 import jax
 import numpy as np
@@ -27,7 +26,7 @@ from elastax.io import load_drive_parts
 from elastax.robots import kr210
 from elastax.signals import Reference
 
-from ._machine import machine, versions
+from ._machine import header
 from ._timing import Effort, compile_timed, measure
 
 
@@ -131,21 +130,17 @@ def main(argv: list[str] | None = None) -> int:
     options = parser.parse_args(argv)
     jax.config.update("jax_enable_x64", True)
     jax.config.update("jax_enable_compilation_cache", False)
-    header = {
-        "machine": machine(),
-        "versions": versions(),
-        "date": time.strftime("%Y-%m-%d"),
-    }
+    head = header()
     names = options.names or sorted(path.stem for path in EXAMPLES.glob("*.toml"))
     rows: list[dict] = []
     for name in [None, *names]:
         rows.append(figures(name))
         print(json.dumps(rows[-1]), flush=True)
         options.out.mkdir(parents=True, exist_ok=True)
-        content = json.dumps({**header, "rows": rows}, indent=1) + "\n"
+        content = json.dumps({**head, "rows": rows}, indent=1) + "\n"
         (options.out / "drive_parts.json").write_text(content)
-        (options.out / "DRIVE_PARTS.md").write_text(markdown(header, rows))
-    print(markdown(header, rows))
+        (options.out / "DRIVE_PARTS.md").write_text(markdown(head, rows))
+    print(markdown(head, rows))
     numbers = [v for row in rows for v in row.values() if isinstance(v, float)]
     return 0 if np.all(np.isfinite(numbers)) else 1
 

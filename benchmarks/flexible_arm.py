@@ -11,7 +11,6 @@ import argparse
 import json
 import pathlib
 import sys
-import time
 
 import equinox as eqx
 import jax
@@ -29,7 +28,7 @@ from elastax.structure import (
     modal_beam,
 )
 
-from ._machine import machine, versions
+from ._machine import header
 
 
 # an aluminium strip, 40 x 4 mm, that bends over its thin side
@@ -187,17 +186,12 @@ def main(argv: list[str] | None = None) -> int:
     import exudyn
 
     rows = compare()
-    header = {
-        "machine": machine(),
-        "versions": versions(),
-        "exudyn": exudyn.__version__,
-        "date": time.strftime("%Y-%m-%d"),
-    }
+    head = header() | {"exudyn": exudyn.__version__}
     options.out.mkdir(parents=True, exist_ok=True)
-    content = json.dumps({**header, "rows": rows}, indent=1).replace("NaN", "null")
+    content = json.dumps({**head, "rows": rows}, indent=1).replace("NaN", "null")
     (options.out / "flexible_arm.json").write_text(content + "\n")
-    (options.out / "FLEXIBLE_ARM.md").write_text(markdown(header, rows))
-    print(markdown(header, rows))
+    (options.out / "FLEXIBLE_ARM.md").write_text(markdown(head, rows))
+    print(markdown(head, rows))
     return int(any(row["difference"] > 0.01 for row in rows))
 
 

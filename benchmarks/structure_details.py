@@ -38,7 +38,7 @@ from elastax.robots import (
 from elastax.signals import Reference
 from elastax.structure import ModeCounts
 
-from ._machine import machine, versions
+from ._machine import header
 from ._timing import Effort, compile_timed, measure
 
 
@@ -221,11 +221,7 @@ def main(argv: list[str] | None = None) -> int:
     options = parser.parse_args(argv)
     jax.config.update("jax_enable_x64", True)
     jax.config.update("jax_enable_compilation_cache", False)
-    header = {
-        "machine": machine(),
-        "versions": versions(),
-        "date": time.strftime("%Y-%m-%d"),
-    }
+    head = header()
     rows: list[dict] = []
     grown: list[dict] = []
 
@@ -233,16 +229,16 @@ def main(argv: list[str] | None = None) -> int:
         into.append(row)
         print(json.dumps(row), flush=True)
         options.out.mkdir(parents=True, exist_ok=True)
-        content = json.dumps({**header, "rows": rows, "growth": grown}, indent=1)
+        content = json.dumps({**head, "rows": rows, "growth": grown}, indent=1)
         (options.out / "structure_details.json").write_text(content + "\n")
-        text = markdown(header, rows, grown)
+        text = markdown(head, rows, grown)
         (options.out / "STRUCTURE_DETAILS.md").write_text(text)
 
     for name in options.details:
         keep(rows, figures(name))
     for modes in options.modes:
         keep(grown, growth(modes))
-    print(markdown(header, rows, grown))
+    print(markdown(head, rows, grown))
     numbers = [v for row in rows + grown for v in row.values() if isinstance(v, float)]
     if not np.all(np.isfinite(numbers)):
         return 1

@@ -29,6 +29,22 @@ if "JAX_COMPILATION_CACHE_DIR" not in os.environ:
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
 
 
+_MAPS = pathlib.Path("/proc/self/maps")
+_MANY_MAPS = 15_000
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _programs_are_let_go():
+    """Forget what was compiled once a process holds much of it.
+
+    A program takes several memory maps; where a process comes to 65,530 of them, the
+    limit of Linux, it is aborted.
+    """
+    yield
+    if _MAPS.exists() and len(_MAPS.read_bytes().splitlines()) > _MANY_MAPS:
+        jax.clear_caches()
+
+
 @pytest.fixture(scope="session")
 def data_dir() -> pathlib.Path:
     """The folder of recordings, which are no part of the project."""

@@ -2,6 +2,7 @@
 
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -37,8 +38,12 @@ def balanced(A, B, C, D) -> Balanced:
     xp: Any = np if isinstance(A, np.ndarray) else jnp
     n, m, p = A.shape[0], B.shape[1], C.shape[0]
     inside = 1.0 - xp.eye(n, dtype=A.dtype)
-    state, inputs, outputs = (xp.ones((k,), A.dtype) for k in (n, m, p))
-    for _ in range(_SWEEPS):
+    # powers of two have no derivative
+    fixed = (A, B, C) if xp is np else jax.lax.stop_gradient((A, B, C))
+
+    def sweep(_, factors):
+        state, inputs, outputs = factors
+        A, B, C = fixed
         a = A * inside * state[None] / state[:, None]
         b = B * inputs[None] / state[:, None]
         c = C * state[None] / outputs[:, None]
@@ -51,6 +56,15 @@ def balanced(A, B, C, D) -> Balanced:
         c = C * state[None] / outputs[:, None]
         inputs = inputs * _power(xp, size / _norm(xp, b, 0))
         outputs = outputs * _power(xp, _norm(xp, c, 1) / size)
+        return state, inputs, outputs
+
+    factors = tuple(xp.ones((k,), A.dtype) for k in (n, m, p))
+    if xp is np:
+        for k in range(_SWEEPS):
+            factors = sweep(k, factors)
+    else:
+        factors = jax.lax.fori_loop(0, _SWEEPS, sweep, factors)
+    state, inputs, outputs = factors
     return Balanced(
         A * state[None] / state[:, None],
         B * inputs[None] / state[:, None],

@@ -172,7 +172,7 @@ class MotorEncoder(AbstractSensor):
         return theta[np.array(self.axes)]
 
     def names(self, robot):
-        return tuple(f"motor {robot.axis_names[k]} [rad]" for k in self.axes)
+        return _angle_names("motor", robot, self.axes)
 
 
 class JointEncoder(AbstractSensor):
@@ -184,7 +184,7 @@ class JointEncoder(AbstractSensor):
         return q[np.array(self.axes)]
 
     def names(self, robot):
-        return tuple(f"joint {robot.axis_names[k]} [rad]" for k in self.axes)
+        return _angle_names("joint", robot, self.axes)
 
 
 class SensorGroup(AbstractSensor):
@@ -198,6 +198,10 @@ class SensorGroup(AbstractSensor):
 
     def names(self, robot):
         return tuple(name for sensor in self.sensors for name in sensor.names(robot))
+
+
+def _angle_names(what: str, robot: ElasticRobot, axes: tuple[int, ...]):
+    return tuple(f"{what} {robot.axis_names[k]} [rad]" for k in axes)
 
 
 def _frame(robot: ElasticRobot, joint: int, q, eta):

@@ -79,29 +79,39 @@ class ControlSystem(eqx.Module):
         """
         require_float64("the analysis of a nonlinear system")
         x = jnp.asarray(x)
-        shapes = [("the state", x.shape, self.states)]
-        one = jnp.ones((self.inputs,), x.dtype)
-        rate, output = self.rate(x, one), self.output(x)
-        shapes += [("`rate`", jnp.shape(rate), self.states)]
-        shapes += [("`output`", jnp.shape(output), self.outputs)]
-        for name, shape, size in shapes:
+        one = np.ones((self.inputs,), x.dtype)
+        for name, size, shape_of in (
+            ("the state", self.states, lambda: x),
+            ("`rate`", self.states, lambda: jax.eval_shape(self.rate, x, one)),
+            ("`output`", self.outputs, lambda: jax.eval_shape(self.output, x)),
+        ):
+            shape = shape_of().shape
             if shape != (size,):
                 raise ValueError(
                     f"{name} must have the shape ({size},), one entry per name, "
                     f"but has {shape}"
                 )
-        values = np.concatenate([np.ravel(rate), np.ravel(output), np.ravel(x)])
+        rate, drift, output, gain = map(np.asarray, _values(self, x))
+        values = np.concatenate([rate, output, np.asarray(x)])
         if not np.isfinite(values).all():
             raise ValueError(f"the system is not finite at x = {np.asarray(x)}")
-        straight = self.drift(x) + self.input_matrix(x) @ one
-        size = np.abs(np.asarray(straight)) + np.abs(np.asarray(self.drift(x)))
-        off = np.abs(np.asarray(rate - straight))
+        straight = drift + gain @ one
+        size = np.abs(straight) + np.abs(drift)
+        off = np.abs(rate - straight)
         if np.any(off > 1e-9 * (size + off)):
             k = int(np.argmax(off))
             raise ValueError(
                 "the rates must be affine in the inputs, f(x) + g(x) u, but that of "
                 f"`{self.names.states[k]}` is not: put an integrator before the input"
             )
+
+
+@eqx.filter_jit
+def _values(system: ControlSystem, x):
+    """Rate under unit inputs and under none, output and input matrix."""
+    one = jnp.ones((system.inputs,), x.dtype)
+    drift = system.drift(x)
+    return system.rate(x, one), drift, system.output(x), system.input_matrix(x)
 
 
 def linearise(system: ControlSystem, x, u) -> LinearModel:
@@ -116,7 +126,11 @@ def linearise(system: ControlSystem, x, u) -> LinearModel:
         [Reiner2010] (3.38); (3.47a) with the term of the input that is missing there.
     """
     require_float64("linearisation")
-    x, u = jnp.asarray(x), jnp.asarray(u)
+    return _linearised(system, jnp.asarray(x), jnp.asarray(u))
+
+
+@eqx.filter_jit
+def _linearised(system: ControlSystem, x, u) -> LinearModel:
     A, B = jax.jacfwd(system.rate, argnums=(0, 1))(x, u)
     C = jax.jacfwd(system.output)(x)
     point = OperatingPoint(x, u, system.output(x), system.rate(x, u))

@@ -83,14 +83,13 @@ def relative_degree(system: ControlSystem, x) -> RelativeDegree:
         )
     spread = _NEAR * (1.0 + np.abs(np.asarray(x)))
     draw = np.random.default_rng(0).uniform(-1.0, 1.0, (3, system.states))
-    points = jnp.concatenate([x[None], x[None] + jnp.asarray(draw * spread)])
-    linear = linearise(system, x, jnp.zeros((system.inputs,), x.dtype))
-    scale = balanced(linear.A, linear.B, linear.C, linear.D).state
+    points = np.concatenate([np.zeros_like(draw[:1]), draw * spread]) + np.asarray(x)
+    linear = linearise(system, x, np.zeros((system.inputs,), x.dtype))
+    matrices = (linear.A, linear.B, linear.C, linear.D)
+    scale = balanced(*map(np.asarray, matrices)).state
     degrees: dict[int, int] = {}
     for order in range(system.states):
-        row, size = map(
-            np.asarray, jax.jit(jax.vmap(_rows(system, order, scale)))(points)
-        )
+        row, size = map(np.asarray, _rows(system, order, scale, points))
         there = np.any(np.abs(row) > _ROUNDING * size, axis=2)
         for i in range(system.outputs):
             if i in degrees:
@@ -112,8 +111,7 @@ def relative_degree(system: ControlSystem, x) -> RelativeDegree:
                 "degree is not defined"
             )
     found = tuple(degrees[i] for i in range(system.outputs))
-    matrix = decoupling_matrix(system, x, found)
-    values = scaled_singular_values(matrix)
+    matrix, values = _decoupled(system, x, found)
     if float(values[-1]) <= _REGULAR * float(values[0]):
         raise ValueError(
             f"the relative degree is not defined at this state: the decoupling matrix "
@@ -130,8 +128,15 @@ def scaled_singular_values(matrix) -> Float[Array, " values"]:
     return jnp.linalg.svd(matrix / jnp.where(length > 0, length, 1.0), compute_uv=False)
 
 
-def _rows(system: ControlSystem, order: int, scale):
-    """L_g L_f^k h of all outputs, and what rounding can make of it."""
+@eqx.filter_jit
+def _decoupled(system: ControlSystem, x, degrees: tuple[int, ...]):
+    matrix = decoupling_matrix(system, x, degrees)
+    return matrix, scaled_singular_values(matrix)
+
+
+@eqx.filter_jit
+def _rows(system: ControlSystem, order: int, scale, points):
+    """L_g L_f^k h of all outputs, and what rounding can make of it, at points."""
     lower = lie_derivative(system.drift, system.output, order)
 
     def at(x):
@@ -140,4 +145,4 @@ def _rows(system: ControlSystem, order: int, scale):
         field_size = jnp.linalg.norm(fields / scale[:, None], axis=0)
         return slope @ fields, slope_size[:, None] * field_size[None]
 
-    return at
+    return jax.vmap(at)(points)

@@ -12,6 +12,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from .._checks import is_concrete
 from .._custom_types import PerJoint, Scalar, as_real, require_float64
@@ -121,9 +122,10 @@ def linear_robot(
 ) -> LinearModel:
     """Linear model of a robot that rests at given motor angles.
 
-    The equilibrium under gravity, counterbalance and springs is solved for. Jittable
-    and vmapped (`equinox.filter_vmap`) over poses, robots and channels; differentiable
-    by all of them.
+    The equilibrium under gravity, counterbalance and springs is solved for. Compiled
+    once per kind of robot and channel; inside other programs it can be vmapped
+    (`equinox.filter_vmap`) over poses, robots and channels, and differentiated by all
+    of them, but then nobody looks whether there is an equilibrium.
 
     Args:
         robot: the robot, with elastic or rigid gears and smooth parts.
@@ -134,6 +136,41 @@ def linear_robot(
         ValueError: parts that switch, no equilibrium, an unknown axis, or a controller
             for the held axes of a robot with rigid gears.
     """
+    model, rest = _linear_model(robot, jnp.asarray(theta), channel)
+    _check_rest(robot, rest)
+    return model
+
+
+def model_and_locked_motors(
+    robot: ElasticRobot, theta: PerJoint, channel: RobotChannel
+) -> tuple[LinearModel, Float[Array, "states states"]]:
+    """The linear model, and A of the links behind locked motors; jittable.
+
+    One set of equations serves both. Controllers of held axes leave poles at zero in
+    the second.
+    """
+    model, _, open_loop = _models(robot, theta, channel)
+    every = np.arange(robot.axes)
+    A, _, _, keep = _moved(open_loop, every)
+    return model, A[jnp.ix_(keep, keep)]
+
+
+@eqx.filter_jit
+def _linear_model(robot: ElasticRobot, theta, channel: RobotChannel):
+    model, rest, _ = _models(robot, theta, channel)
+    return model, rest
+
+
+class _Rest(NamedTuple):
+    """Coordinates at rest, forces left on the structure there, and undeformed."""
+
+    q: Any
+    eta: Any
+    left: Any
+    scale: Any
+
+
+def _models(robot: ElasticRobot, theta, channel: RobotChannel):
     require_float64("the linear model of a robot")
     held = channel.inputs.held(robot)
     if robot.drives.switches:
@@ -142,9 +179,9 @@ def linear_robot(
             "switch: take their smooth counterparts"
         )
     robot = with_linear_friction(robot, channel.speed)
-    theta = jnp.asarray(theta)
     q, eta = static_equilibrium(robot, theta)
-    _check_rest(robot, q, eta)
+    forces = jax.vmap(lambda eta: static_load(robot, q, eta)[1])
+    rest = _Rest(q, eta, *forces(jnp.stack([eta, jnp.zeros_like(eta)])))
     build = _elastic_gears if robot.has_elastic_gears else _rigid_gears
     open_loop = build(robot, q, eta, theta, channel.inputs, held)
     C = _output_matrix(robot, open_loop, channel.outputs, q, eta, theta)
@@ -165,7 +202,7 @@ def linear_robot(
     )
     x = open_loop.x[keep]
     point = OperatingPoint(x, u, y, jnp.zeros_like(x))
-    return LinearModel(A, B, C, D, names, point)
+    return LinearModel(A, B, C, D, names, point), rest, open_loop
 
 
 def with_linear_friction(robot: ElasticRobot, speed) -> ElasticRobot:
@@ -185,10 +222,11 @@ def with_linear_friction(robot: ElasticRobot, speed) -> ElasticRobot:
     )
 
 
-def _check_rest(robot: ElasticRobot, q, eta) -> None:
-    if not is_concrete(q, eta):
+def _check_rest(robot: ElasticRobot, rest: _Rest) -> None:
+    if not is_concrete(*rest):
         return
-    values = np.concatenate([np.asarray(q), np.asarray(eta)])
+    q, eta, left, scale = map(np.asarray, rest)
+    values = np.concatenate([q, eta])
     if not np.isfinite(values).all():
         raise ValueError(
             f"`{robot.name}` has no equilibrium at these motor angles: the springs "
@@ -196,12 +234,10 @@ def _check_rest(robot: ElasticRobot, q, eta) -> None:
         )
     if not robot.elastic:
         return
-    _, rest = map(np.asarray, static_load(robot, q, eta))
-    scale = np.asarray(static_load(robot, q, 0.0 * eta)[1])
-    if np.abs(rest).max() > 1e-6 * (1.0 + np.abs(scale).max()):
+    if np.abs(left).max() > 1e-6 * (1.0 + np.abs(scale).max()):
         raise ValueError(
             f"`{robot.name}` finds no equilibrium at these motor angles: forces of "
-            f"{np.abs(rest).max():.3g} are left on the structure; check stiffness and "
+            f"{np.abs(left).max():.3g} are left on the structure; check stiffness and "
             "payload"
         )
 

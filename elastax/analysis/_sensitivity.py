@@ -9,7 +9,6 @@ import numpy as np
 
 from .._custom_types import PerJoint
 from ..dynamics import ElasticRobot
-from ._channels import MotorAngles
 from ._robot_model import RobotChannel
 from ._zero_map import pose_figures
 
@@ -79,9 +78,7 @@ def sensitivities(
 def _slopes(parameters, rest, theta, channel, degrees):
     def figures(parameters):
         robot = eqx.combine(parameters, rest)
-        every = tuple(range(robot.axes))
-        locked = RobotChannel(MotorAngles(every), channel.outputs, channel.speed)
-        found = pose_figures(robot, theta, locked, channel, degrees)
+        found = pose_figures(robot, theta, channel, degrees)
         return jnp.stack([found.frequency, found.slowest_right])
 
     return figures(parameters), jax.jacrev(figures)(parameters)

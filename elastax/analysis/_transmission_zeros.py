@@ -99,11 +99,12 @@ def _null_vector(factors, transposed: int, start):
     """By inverse iteration from a vector that is hardly ever orthogonal to it."""
     size, kind = factors[0].shape[0], factors[0].dtype
     x = jnp.cos(1.0 + jnp.arange(size, dtype=factors[0].real.dtype)).astype(kind)
-    x = x + start
-    for _ in range(_ITERATIONS):
+
+    def step(_, x):
         x = jax.scipy.linalg.lu_solve(factors, x, trans=transposed)
-        x = x / jnp.linalg.norm(x).astype(kind)
-    return x
+        return x / jnp.linalg.norm(x).astype(kind)
+
+    return jax.lax.fori_loop(0, _ITERATIONS, step, x + start)
 
 
 def _zero_dynamics(A, B, C, D, degrees):

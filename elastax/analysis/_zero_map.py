@@ -7,9 +7,8 @@ import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
 from ..dynamics import ElasticRobot
-from ._channels import MotorAngles
 from ._linear_model import LinearModel
-from ._robot_model import RobotChannel, linear_robot
+from ._robot_model import RobotChannel, linear_robot, model_and_locked_motors
 from ._transmission_zeros import transmission_zeros
 
 
@@ -48,7 +47,6 @@ class PoseFigures(eqx.Module):
 def pose_figures(
     robot: ElasticRobot,
     theta,
-    locked: RobotChannel,
     channel: RobotChannel,
     degrees: tuple[int, ...],
     *,
@@ -62,14 +60,13 @@ def pose_figures(
     Args:
         robot: the robot.
         theta: motor angles at rest [rad].
-        locked: channel whose poles are those with all motors locked.
         channel: whose zeros are looked at.
         degrees: relative degrees of its outputs.
         singular: below which a decoupling matrix counts as singular.
     """
-    model = linear_robot(robot, theta, channel)
+    model, locked = model_and_locked_motors(robot, theta, channel)
     zeros = transmission_zeros(model.A, model.B, model.C, model.D, degrees)
-    still = linear_robot(robot, _after(theta, zeros), locked).poles()
+    still = jnp.linalg.eigvals(_after(locked, zeros))
     swinging = still.imag > 0
     size = jnp.where(swinging, jnp.abs(still), jnp.inf)
     first = jnp.argmin(size)
@@ -169,8 +166,6 @@ def zero_map(
     if poses.ndim != 2 or poses.shape[1] != robot.axes:
         raise ValueError(f"`poses` must be (poses, {robot.axes}), but is {poses.shape}")
     degrees = _degrees(robot, poses, channel)
-    every = tuple(range(robot.axes))
-    locked = RobotChannel(MotorAngles(every), channel.outputs, channel.speed)
     if not robot.has_elastic_gears and not robot.elastic:
         raise ValueError("a rigid robot has no eigenfrequencies and no zeros to map")
 
@@ -179,7 +174,7 @@ def zero_map(
         some = poses[start : start + batch]
         missing = batch - len(some) if len(poses) > batch else 0
         filled = jnp.concatenate([some, jnp.repeat(some[-1:], missing, axis=0)])
-        found = jax.device_get(_figures(robot, filled, locked, channel, degrees))
+        found = jax.device_get(_figures(robot, filled, channel, degrees))
         parts.append(jax.tree.map(lambda x: x[: len(some)], found))
         if progress is not None:
             progress(start + len(some))
@@ -188,10 +183,10 @@ def zero_map(
 
 
 @eqx.filter_jit
-def _figures(robot, poses, locked, channel, degrees):
+def _figures(robot, poses, channel, degrees):
     def at(pose):
         theta = robot.from_maker(pose)
-        return pose_figures(robot, theta, locked, channel, degrees)
+        return pose_figures(robot, theta, channel, degrees)
 
     # one by one: on single matrices LAPACK never waits
     return jax.lax.map(at, poses)
@@ -199,10 +194,9 @@ def _figures(robot, poses, locked, channel, degrees):
 
 def _degrees(robot: ElasticRobot, poses, channel: RobotChannel) -> tuple[int, ...]:
     """Relative degrees at the first of some poses at which they are defined."""
-    linear = eqx.filter_jit(linear_robot)
     some = np.unique(np.linspace(0, len(poses) - 1, 12).astype(int))
     for k in some:
-        model = linear(robot, robot.from_maker(poses[k]), channel)
+        model = linear_robot(robot, robot.from_maker(poses[k]), channel)
         counts = len(model.names.inputs), len(model.names.outputs)
         if counts[0] != counts[1]:
             raise ValueError(

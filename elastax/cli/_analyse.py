@@ -2,7 +2,6 @@
 
 import dataclasses
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
@@ -68,7 +67,7 @@ def analyse(config: AnalyseConfig, progress: Progress) -> int:
     )
     progress.say("compiling the linear model ...")
     theta = robot.from_maker(jnp.deg2rad(jnp.asarray(pose)))
-    model = eqx.filter_jit(linear_robot)(robot, theta, channel)
+    model = linear_robot(robot, theta, channel)
     result = figures_of(model)
     result |= {
         "schema": SCHEMA,

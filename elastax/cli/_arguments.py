@@ -146,6 +146,37 @@ def parse(argv: list[str] | None) -> tuple[str, Config]:
     return command, FeedforwardConfig(**values)
 
 
+def _add_robot(add, default) -> None:
+    """Options that say which robot, with what in its hand, and where."""
+    add("--robot", default=default.robot, metavar="NAME|FILE", help="the robot")
+    add(
+        "--parts",
+        metavar="FILE.toml",
+        help="other parts in the drive trains: friction, stiffness, hysteresis, lag; "
+        "see examples/drive_parts",
+    )
+    add(
+        "--payload",
+        nargs="+",
+        type=float,
+        metavar="NUMBER",
+        help="mass [kg], centre of mass x y z [m] in the flange frame, moments of "
+        "inertia xx yy zz about it [kg m^2]; 0 takes the payload off",
+    )
+    add(
+        "--pose",
+        nargs="+",
+        default=list(default.pose),
+        metavar="POSE",
+        help="named pose, or one angle per axis [deg]",
+    )
+
+
+def _add_output(add, default) -> None:
+    add("--out", default=default.out, metavar="DIR", help="folder of the results")
+    add("--quiet", action="store_true", help="no progress")
+
+
 def _add_feedforward(commands) -> None:
     default = FeedforwardConfig()
     parser = commands.add_parser(
@@ -160,24 +191,11 @@ def _add_feedforward(commands) -> None:
         allow_abbrev=False,
     )
     add = parser.add_argument
-    add("--robot", default=default.robot, metavar="NAME|FILE", help="the robot")
-    add(
-        "--parts",
-        metavar="FILE.toml",
-        help="other parts in the drive trains of plant and inverses: friction, "
-        "stiffness, hysteresis, lag; see examples/drive_parts",
-    )
+    _add_robot(add, default)
     add(
         "--plant-parts",
         metavar="FILE.toml",
-        help="the same in the plant alone, exact (switching) parts included",
-    )
-    add(
-        "--pose",
-        nargs="+",
-        default=list(default.pose),
-        metavar="POSE",
-        help="named pose, or one angle per axis [deg]",
+        help="other parts in the plant alone, exact (switching) ones included",
     )
     add(
         "--move",
@@ -192,14 +210,6 @@ def _add_feedforward(commands) -> None:
         metavar="rectangle|FILE.csv",
         help="straight Cartesian path instead of a move: the rectangle of figure 6.5, "
         "or way-points x, y, z [m] in the base frame; orientation stays",
-    )
-    add(
-        "--payload",
-        nargs="+",
-        type=float,
-        metavar="NUMBER",
-        help="mass [kg], centre of mass x y z [m] in the flange frame, moments of "
-        "inertia xx yy zz about it [kg m^2]; 0 takes the payload off",
     )
     add(
         "--inverse",
@@ -248,9 +258,8 @@ def _add_feedforward(commands) -> None:
         action="store_true",
         help="measure the time of single steps of each inverse",
     )
-    add("--out", default=default.out, metavar="DIR", help="folder of the results")
     add("--seed", type=int, default=default.seed, help="kept in the results")
-    add("--quiet", action="store_true", help="no progress")
+    _add_output(add, default)
 
 
 def _add_analyse(commands) -> None:
@@ -265,22 +274,7 @@ def _add_analyse(commands) -> None:
         allow_abbrev=False,
     )
     add = parser.add_argument
-    add("--robot", default=default.robot, metavar="NAME|FILE", help="the robot")
-    add("--parts", metavar="FILE.toml", help="other parts in the drive trains")
-    add(
-        "--pose",
-        nargs="+",
-        default=list(default.pose),
-        metavar="POSE",
-        help="named pose, or one angle per axis [deg]",
-    )
-    add(
-        "--payload",
-        nargs="+",
-        type=float,
-        metavar="NUMBER",
-        help="as for feedforward; 0 takes the payload off",
-    )
+    _add_robot(add, default)
     add(
         "--input",
         choices=("torque", "angle"),
@@ -327,5 +321,4 @@ def _add_analyse(commands) -> None:
         action="store_true",
         help="derivatives of zero and frequency by every parameter",
     )
-    add("--out", default=default.out, metavar="DIR", help="folder of the results")
-    add("--quiet", action="store_true", help="no progress")
+    _add_output(add, default)

@@ -13,7 +13,7 @@ from .._custom_types import PerElastic, PerJoint, Transform, Vector3, as_real
 from .._taylor import concatenate, product
 from ..drivetrain import AbstractCounterbalance, DriveTrain
 from ..kinematics import Arm, DeformableArm, SerialChain
-from ..structure import AbstractStiffness
+from ..structure import AbstractStiffness, BodyDetail
 from ._bodies import RigidBodies
 from ._modal_links import ModalLink, undeformed_bodies
 from ._reduce import locked_chain
@@ -277,6 +277,14 @@ class ElasticRobot(eqx.Module):
         return dataclasses.replace(
             self, drives=dataclasses.replace(self.drives, **parts)
         )
+
+    def with_body_detail(self, detail: BodyDetail) -> "ElasticRobot":
+        """The same robot with other terms in the equations of its flexible links."""
+        links = tuple(
+            dataclasses.replace(link, body=link.body.with_detail(detail))
+            for link in self.modal_links
+        )
+        return dataclasses.replace(self, modal_links=links)
 
     def with_payload(self, mass, com, inertia) -> "ElasticRobot":
         """The same robot with another payload.

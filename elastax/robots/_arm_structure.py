@@ -26,8 +26,8 @@ from ..structure import (
     ModeCounts,
     SlenderBody,
     UniformBeam,
+    modal_beam,
 )
-from ._built_beam import built_beam
 
 
 class Member(NamedTuple):
@@ -166,7 +166,7 @@ class ModalArm(AbstractArmStructure):
         return False
 
     def member(self, name: str, tube: UniformBeam, damping_time: float) -> Member:
-        body = built_beam(tube, self.counts, damping_ratio=self.damping_ratio)
+        body = modal_beam(tube, self.counts, damping_ratio=self.damping_ratio)
         body = dataclasses.replace(body, nodes=_exact_base(body))
         return modal_member(name, body, "tip", None)
 

@@ -24,8 +24,8 @@ from ..structure import (
     SupportedFree,
     TipMass,
     UniformBeam,
+    modal_beam,
 )
-from ._built_beam import built_beam
 
 
 STEEL = Material(young=2.1e11, shear=8.1e10, density=7850.0)
@@ -129,7 +129,7 @@ def one_link_arm(
     section = BeamSection(1e-2, 1e-10, 1e-10, 2e-10)
     beam = UniformBeam(material, section, 0.7)
     tip = TipMass(payload, np.zeros(3)) if payload else None
-    body = built_beam(beam, ModeCounts(modes), tip, rotary_inertia=False)
+    body = modal_beam(beam, ModeCounts(modes), tip=tip, rotary_inertia=False)
     drives = DriveTrain(
         ratio=np.ones(1),
         motor=Motor(np.ones(1)),
@@ -163,10 +163,10 @@ def one_link_arm(
 
 def _bending_beam(beam, modes, tip_mass, support, outputs):
     tip = TipMass(tip_mass, np.zeros(3)) if tip_mass else None
-    return built_beam(
+    return modal_beam(
         beam,
         ModeCounts(modes),
-        tip,
+        tip=tip,
         support=support,
         rotary_inertia=False,
         damping_ratio=DAMPING_RATIO,
@@ -249,7 +249,7 @@ def three_axis_arm(
         0.9,
     )
     shape = TipMass(load, np.zeros(3), belongs=False)
-    body = built_beam(tube, counts, shape, damping_ratio=0.01)
+    body = modal_beam(tube, counts, tip=shape, damping_ratio=0.01)
     upright = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
     box = lambda x: np.diag([0.01, x, x])
     aside = (0.0, 0.05, 0.10)

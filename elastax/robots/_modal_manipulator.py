@@ -25,9 +25,9 @@ from ..structure import (
     UniformBeam,
     beam_frame,
     eigenmodes,
+    modal_beam,
     modal_body,
 )
-from ._built_beam import built_beam
 
 
 ALUMINIUM = Material(young=7e10, shear=2.6e10, density=2700.0)
@@ -107,10 +107,10 @@ def modal_manipulator(
             f"the link must reach by {LINK_LENGTH} m along x from `base` to `tip`, but "
             f"does by {reach} m"
         )
-    beam = built_beam(
+    beam = modal_beam(
         BEAM,
         ModeCounts(beam_modes),
-        TipMass(load, np.zeros(3)),
+        tip=TipMass(load, np.zeros(3)),
         damping_ratio=DAMPING_RATIO,
     )
     raised = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])

@@ -36,6 +36,7 @@ from ._bending_modes import (
     bending_modes as bending_modes,
 )
 from ._body_detail import (
+    BODY_DETAILS as BODY_DETAILS,
     NOMINAL as NOMINAL,
     VARIANT_1 as VARIANT_1,
     VARIANT_2 as VARIANT_2,

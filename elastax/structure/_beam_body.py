@@ -6,9 +6,11 @@ eigenfunctions are those of Rayleigh's or Euler and Bernoulli's beam; all integr
 along it are Gauss-Legendre sums.
 """
 
+import dataclasses
 from collections.abc import Sequence
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -117,46 +119,72 @@ def modal_beam(
         raise ValueError(f"`nodes` must lie within (0, 1) of the length, not {nodes}")
     ratio = as_real(damping_ratio)
     check_values("`damping_ratio` must not be negative", ratio, ratio >= 0)
-    length, density = beam.length, beam.material.density
-    section, young = beam.section, beam.material.young
+    body = _built(
+        beam,
+        counts,
+        support,
+        tip,
+        tuple(places.tolist()),
+        name,
+        rotary_inertia=rotary_inertia,
+        shortening=shortening,
+    )
+    damping = jnp.diag(2.0 * ratio * jnp.sqrt(jnp.diag(body.K_e)))
+    return dataclasses.replace(body, D_e=damping)
+
+
+@eqx.filter_jit
+def _built(
+    beam: UniformBeam,
+    counts: ModeCounts,
+    support: AbstractSupport,
+    tip: TipMass | None,
+    places: tuple[float, ...],
+    name: str,
+    *,
+    rotary_inertia: bool,
+    shortening: bool,
+) -> ModalBody:
+    """The undamped body, in one program: of hundreds of small ones it takes longer."""
+    length, density, section = beam.length, beam.material.density, beam.section
     mu = density * section.area
     I_y, I_z = section.second_moment_y, section.second_moment_z
     zero = jnp.zeros_like(length)
     weight, inertia = (zero, jnp.zeros(3)) if tip is None else (tip.mass, tip.inertia)
-
-    def bending(number, I, turning):
-        return bending_modes(
-            young * I,
-            mu,
-            length,
-            number,
-            support=support,
-            rotary_inertia=density * I if rotary_inertia else zero,
-            tip_mass=weight,
-            tip_inertia=turning,
+    families = []
+    if counts.bending_xy or counts.bending_xz:
+        # both planes at once: the search for roots is most of the program
+        both = jnp.stack([I_z, I_y])
+        planes = jax.vmap(
+            lambda I, turning: bending_modes(
+                beam.material.young * I,
+                mu,
+                length,
+                max(counts.bending_xy, counts.bending_xz),
+                support=support,
+                rotary_inertia=density * I if rotary_inertia else zero,
+                tip_mass=weight,
+                tip_inertia=turning,
+            )
+        )(both, inertia[np.array([2, 1])])
+        for k, number in enumerate((counts.bending_xy, counts.bending_xz)):
+            first = lambda x, k=k, n=number: x[k, :n] if x.ndim > 1 else x[k]
+            families.append((number, ("xy", "xz")[k], jax.tree.map(first, planes)))
+    if counts.torsion:
+        modes = torsion_modes(
+            beam, counts.torsion, support=support, tip_inertia=inertia[0]
         )
-
-    families = [
-        (counts.bending_xy, "xy", lambda n: bending(n, I_z, inertia[2])),
-        (counts.bending_xz, "xz", lambda n: bending(n, I_y, inertia[1])),
-        (
-            counts.torsion,
-            "torsion",
-            lambda n: torsion_modes(beam, n, support=support, tip_inertia=inertia[0]),
-        ),
-        (
-            counts.extension,
-            "extension",
-            lambda n: extension_modes(beam, n, support=support, tip_mass=weight),
-        ),
-    ]
+        families.append((counts.torsion, "torsion", modes))
+    if counts.extension:
+        modes = extension_modes(
+            beam, counts.extension, support=support, tip_mass=weight
+        )
+        families.append((counts.extension, "extension", modes))
     abscissas, weights = _gauss(20 + 8 * max(n for n, _, _ in families))
-    whole = jnp.asarray(np.concatenate([abscissas, [0.0], places, [1.0]])) * length
+    points = np.concatenate([abscissas, [0.0], places, [1.0]])
+    whole = jnp.asarray(points) * length
     squares, shapes, turns, slopes, labels = [], [], [], [], []
-    for number, label, modes_of in families:
-        if not number:
-            continue
-        modes = modes_of(number)
+    for number, label, modes in families:
         squares.append(modes.frequencies**2)
         labels += [f"{label} {k + 1}" for k in range(number)]
         shape, turn, slope = _fields(label, modes, whole)
@@ -184,7 +212,7 @@ def modal_beam(
         pick = lambda x: jnp.concatenate([x[:count], x[-1:]])
     stiffness = jnp.concatenate(squares)
     names = ("base", *(f"{place:g} l" for place in places), "tip")
-    body = point_mass_body(
+    return point_mass_body(
         masses,
         pick(positions),
         pick(phi),
@@ -198,8 +226,6 @@ def modal_beam(
         mode_names=tuple(labels),
         name=name,
     )
-    damping = jnp.diag(2.0 * ratio * jnp.sqrt(stiffness))
-    return eqx.tree_at(lambda body: body.D_e, body, damping)
 
 
 def _fields(label: str, modes, x):
@@ -237,14 +263,14 @@ def _gauss(number: int):
     return 0.5 * (nodes + 1.0), 0.5 * weights
 
 
-def _antiderivative(abscissas, places) -> np.ndarray:
+def _antiderivative(abscissas, places: tuple[float, ...]) -> np.ndarray:
     """Integrals from 0 to all points of what is known at the abscissas, (points, n).
 
     By the expansion in Legendre polynomials that has the values at the abscissas.
     """
     nodes = 2.0 * np.asarray(abscissas) - 1.0
     number = len(nodes)
-    ends = np.concatenate([nodes, [-1.0], 2.0 * places - 1.0, [1.0]])
+    ends = np.concatenate([nodes, [-1.0], 2.0 * np.array(places) - 1.0, [1.0]])
     weights = np.polynomial.legendre.leggauss(number)[1]
     legendre = np.polynomial.legendre
     degree = np.arange(number)

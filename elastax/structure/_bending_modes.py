@@ -60,7 +60,7 @@ class BendingModes(eqx.Module):
 
     def _derivative(self, x, order):
         a, b = self.trigonometric[:, None], self.exponential[:, None]
-        rows = _basis(x[None], a, b, self.length, order)
+        rows = _derivatives(_basis(x[None], a, b, self.length), a, b, order)
         return jnp.einsum("kj,jkp->kp", self.coefficients, jnp.stack(rows))
 
 
@@ -157,25 +157,25 @@ class _Shape(eqx.Module):
         """The four boundary conditions as rows for A to D, of order one."""
         a, b = self.wave_numbers(beta)
         square = beta**4
-        at = lambda x, order: jnp.stack(_basis(x, a, b, 1.0, order))
-        zero, one = jnp.zeros_like(beta), jnp.ones_like(beta)
-        shear = lambda x: at(x, 3) + self.rotary * square * at(x, 1)
+        base, tip = (_basis(jnp.full_like(beta, x), a, b, 1.0) for x in (0.0, 1.0))
+        at = lambda end, order: jnp.stack(_derivatives(end, a, b, order))
+        shear = lambda end: at(end, 3) + self.rotary * square * at(end, 1)
         support = self.support
-        first = at(zero, 0) if support.holds_deflection else shear(zero) / a**3
-        second = at(zero, 1) / a if support.holds_slope else at(zero, 2) / a**2
-        moment = at(one, 2) - square * self.inertia * at(one, 1)
+        first = at(base, 0) if support.holds_deflection else shear(base) / a**3
+        second = at(base, 1) / a if support.holds_slope else at(base, 2) / a**2
+        moment = at(tip, 2) - square * self.inertia * at(tip, 1)
         moment = moment / (a**2 + square * self.inertia * a)
-        force = shear(one) + square * self.mass * at(one, 0)
+        force = shear(tip) + square * self.mass * at(tip, 0)
         return jnp.stack([first, second, moment, force / (a**3 + square * self.mass)])
 
     def determinant(self, beta):
         """Zero at the eigenfrequencies."""
-        return jnp.linalg.det(self.conditions(beta))
+        rows = self.conditions(beta)
+        return rows[0] @ _cofactors(rows)[0]
 
     def null_vector(self, beta):
         """A to D at a root: cofactors of the row that depends most on the others."""
-        rows = self.conditions(beta)
-        cofactors = jnp.stack([_cofactors(rows, k) for k in range(4)])
+        cofactors = _cofactors(self.conditions(beta))
         size = jnp.sum(cofactors**2, axis=1)
         best = jnp.argmax(jax.lax.stop_gradient(size))
         return cofactors[best] / jnp.sqrt(size[best])
@@ -190,26 +190,28 @@ class _Shape(eqx.Module):
         return inner + tip + self.inertia * modes.slope(end)[:, 0] ** 2
 
 
-def _basis(x, a, b, length, order):
-    """Derivatives of the four functions at x."""
-    quarter = 0.5 * np.pi * order
-    return (
-        a**order * jnp.cos(a * x + quarter),
-        a**order * jnp.sin(a * x + quarter),
-        (-b) ** order * jnp.exp(-b * x),
-        b**order * jnp.exp(-b * (length - x)),
-    )
+def _basis(x, a, b, length):
+    """The four functions at x."""
+    waves = jnp.cos(a * x), jnp.sin(a * x)
+    return (*waves, jnp.exp(-b * x), jnp.exp(-b * (length - x)))
 
 
-def _cofactors(rows, k):
-    """Signed minors of the row k of a 4 x 4 matrix."""
-    rest = jnp.stack([rows[i] for i in range(4) if i != k])
-    minors = []
-    for j in range(4):
-        columns = [i for i in range(4) if i != j]
-        minor = jnp.linalg.det(rest[:, np.array(columns)])
-        minors.append((-1.0) ** (k + j) * minor)
-    return jnp.stack(minors)
+def _derivatives(basis, a, b, order: int):
+    """Derivatives of the four functions, up to the third, from their values."""
+    cos, sin, near, far = basis
+    waves = ((cos, sin), (-sin, cos), (-cos, -sin), (sin, -cos))[order]
+    size = a**order
+    return size * waves[0], size * waves[1], (-b) ** order * near, b**order * far
+
+
+_REST = np.array([[i for i in range(4) if i != k] for k in range(4)])
+_SIGN = np.array([[1.0, -1.0] * 2, [-1.0, 1.0] * 2] * 2)
+
+
+def _cofactors(rows):
+    """Signed minors of a 4 x 4 matrix: closed forms, which compile to little."""
+    minors = rows[_REST[:, None, :, None], _REST[None, :, None, :]]
+    return jnp.asarray(_SIGN) * jnp.linalg.det(minors)
 
 
 def _quadrature(modes: int):

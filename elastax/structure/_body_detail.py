@@ -66,3 +66,12 @@ VARIANT_2 = BodyDetail(
 VARIANT_3 = BodyDetail(coupling=None, modal_gravity=None)
 VARIANT_4 = BodyDetail(coupling=None)
 VARIANT_5 = BodyDetail(coupling=0, modal_gravity=0)
+# by the names of the text
+BODY_DETAILS = {
+    "nominal": NOMINAL,
+    "variant 1": VARIANT_1,
+    "variant 2": VARIANT_2,
+    "variant 3": VARIANT_3,
+    "variant 4": VARIANT_4,
+    "variant 5": VARIANT_5,
+}

@@ -11,9 +11,9 @@ order (variant 5) is very close to the nominal solution, variants 1 to 4 differ 
 detail, and the rigid solution is far from all.
 """
 
-import dataclasses
 import pathlib
 
+import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -21,27 +21,11 @@ from elastax.dynamics import ElasticRobot, cut_forces, equations_of_motion
 from elastax.kinematics import forward_kinematics
 from elastax.plotting import save_figure
 from elastax.robots import three_axis_arm
-from elastax.structure import (
-    NOMINAL,
-    VARIANT_1,
-    VARIANT_2,
-    VARIANT_3,
-    VARIANT_4,
-    VARIANT_5,
-    BodyDetail,
-)
+from elastax.structure import BODY_DETAILS
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 
-VARIANTS = {
-    "nominal": NOMINAL,
-    "variant 1": VARIANT_1,
-    "variant 2": VARIANT_2,
-    "variant 3": VARIANT_3,
-    "variant 4": VARIANT_4,
-    "variant 5": VARIANT_5,
-}
 AMPLITUDE, FREQUENCY, LAG = 0.35, 1.5, 0.05  # [rad], [Hz], [s] of the filter
 POSE = np.array([0.0, 0.5, -0.9])  # around which the axes move [rad]
 STEP, DURATION, KEPT = 1e-4, 2.0, 10  # [s], [s], every so many steps
@@ -61,13 +45,6 @@ def motion(t):
     return angles(t), rate(t), jax.jvp(rate, (t,), (one,))[1]
 
 
-def with_detail(robot: ElasticRobot, detail: BodyDetail) -> ElasticRobot:
-    """The robot with other terms in the equations of its beam."""
-    (link,) = robot.modal_links
-    link = dataclasses.replace(link, body=link.body.with_detail(detail))
-    return dataclasses.replace(robot, modal_links=(link,))
-
-
 def accelerations(robot, t, eta, etad):
     """Of the modes, under the prescribed motion of the axes."""
     q, qd, qdd = motion(t)
@@ -84,31 +61,18 @@ def simulate(robot: ElasticRobot):
         forces = lambda eta: accelerations(robot, jnp.zeros(()), eta, 0.0 * eta)
         start = start - jnp.linalg.solve(jax.jacfwd(forces)(start), forces(start))
 
-    def rates(t, x):
-        return x[1], accelerations(robot, t, *x)
-
-    def step(x, t):
-        plus = lambda k, f: jax.tree.map(lambda a, b: a + f * b, x, k)
-        k1 = rates(t, x)
-        k2 = rates(t + 0.5 * STEP, plus(k1, 0.5 * STEP))
-        k3 = rates(t + 0.5 * STEP, plus(k2, 0.5 * STEP))
-        k4 = rates(t + STEP, plus(k3, STEP))
-        new = jax.tree.map(
-            lambda a, b, c, d, e: a + STEP / 6.0 * (b + 2.0 * c + 2.0 * d + e),
-            x,
-            k1,
-            k2,
-            k3,
-            k4,
-        )
-        return new, None
-
-    def block(x, t):
-        new, _ = jax.lax.scan(step, x, t + STEP * jnp.arange(float(KEPT)))
-        return new, x
-
     times = STEP * KEPT * jnp.arange(float(round(DURATION / (STEP * KEPT))))
-    _, (eta, etad) = jax.lax.scan(block, (start, 0.0 * start), times)
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(lambda t, x, _: (x[1], accelerations(robot, t, *x))),
+        diffrax.Tsit5(),
+        times[0],
+        times[-1],
+        STEP,
+        (start, 0.0 * start),
+        saveat=diffrax.SaveAt(ts=times),
+        max_steps=round(DURATION / STEP) + 10,
+    )
+    eta, etad = solution.ys
     return times, eta, etad
 
 
@@ -130,7 +94,7 @@ def outputs(robot: ElasticRobot, times, eta, etad):
 
 
 def main(
-    path: pathlib.Path | None = None, names: tuple[str, ...] = tuple(VARIANTS)
+    path: pathlib.Path | None = None, names: tuple[str, ...] = tuple(BODY_DETAILS)
 ) -> dict[str, float]:
     """Root-mean-square deviations from the nominal solution.
 
@@ -141,8 +105,7 @@ def main(
     robot = three_axis_arm()
     curves = {}
     for name in names:
-        detail = VARIANTS[name]
-        plant = with_detail(robot, detail)
+        plant = robot.with_body_detail(BODY_DETAILS[name])
         times, eta, etad = simulate(plant)
         curves[name] = np.asarray(outputs(plant, times, eta, etad))
     stiff = robot.flexible_joint()

@@ -124,12 +124,23 @@ def start_state(robot, sensor, y):
 
 
 def runge_kutta(function, x, step, inputs):
-    """One step, with inputs at its start, middle and end."""
-    k1 = function(x, inputs[0])
-    k2 = function(x + 0.5 * step * k1, inputs[1])
-    k3 = function(x + 0.5 * step * k2, inputs[1])
-    k4 = function(x + step * k3, inputs[2])
-    return x + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    """One step, with inputs at its start, middle and end.
+
+    Its four stages are a loop: one copy of the function to compile.
+    """
+
+    def stage(carry, how):
+        slope, total = carry
+        ahead, weight, u = how
+        slope = function(x + ahead * step * slope, u)
+        return (slope, total + weight * slope), None
+
+    ahead = jnp.array([0.0, 0.5, 0.5, 1.0])
+    weight = jnp.array([1.0, 2.0, 2.0, 1.0]) / 6.0
+    at = inputs[np.array([0, 1, 1, 2])]
+    none = jnp.zeros_like(x)
+    (_, total), _ = jax.lax.scan(stage, (none, none), (ahead, weight, at))
+    return x + step * total
 
 
 @eqx.filter_jit
@@ -152,10 +163,15 @@ def invert(robot, sensor, wanted):
 def drive(plant, start, torque):
     """States of the plant under torques that are linear between the samples."""
 
+    # small steps for the fast modes
+    share = (jnp.arange(4.0)[:, None] + jnp.array([0.0, 0.5, 1.0])[None]) / 4.0
+
+    def small(x, inputs):
+        return runge_kutta(lambda x, u: rate(plant, x, u), x, 0.5 * STEP, inputs), None
+
     def step(x, pair):
-        for k in range(4):  # small steps for the fast modes
-            ends = [pair[0] + (k + s) / 4 * (pair[1] - pair[0]) for s in (0, 0.5, 1)]
-            x = runge_kutta(lambda x, u: rate(plant, x, u), x, 0.5 * STEP, ends)
+        inputs = pair[0] + share[..., None] * (pair[1] - pair[0])
+        x, _ = jax.lax.scan(small, x, inputs)
         return x, x
 
     return jax.lax.scan(step, start, jnp.stack([torque[:-1], torque[1:]], axis=1))[1]

@@ -39,7 +39,6 @@ from tests.helpers import assert_close
 
 EXAMPLE = pathlib.Path(__file__).resolve().parents[2] / "examples" / "robot.toml"
 THETA = jnp.array([0.3, -0.5, 0.9])
-linear = eqx.filter_jit(linear_robot)
 
 
 @pytest.fixture(scope="module")
@@ -50,12 +49,12 @@ def robot():
 
 @pytest.fixture(scope="module")
 def by_torque(robot):
-    return linear(robot, THETA, RobotChannel())
+    return linear_robot(robot, THETA, RobotChannel())
 
 
 @pytest.fixture(scope="module")
 def by_angle(robot):
-    return linear(robot, THETA, RobotChannel(MotorAngles()))
+    return linear_robot(robot, THETA, RobotChannel(MotorAngles()))
 
 
 def sorted_match(found, expected, rtol):
@@ -102,7 +101,7 @@ def test_same_zeros_from_torques_and_from_angles(by_torque, by_angle):
 
 def test_zeros_of_the_collocated_sensor_are_poles_of_locked_motors(robot, by_angle):
     channel = RobotChannel(MotorTorques(), MotorEncoder())
-    model = linear(robot, THETA, channel)
+    model = linear_robot(robot, THETA, channel)
     sorted_match(model.zeros(), by_angle.poles(), 1e-7)
     assert np.all(model.zeros().real < 0)
 
@@ -126,8 +125,8 @@ def test_rigid_gears_by_torque_and_by_angle(robot):
     flexible = eqx.tree_at(
         lambda r: r.drives.stiffness, robot, None, is_leaf=lambda x: x is None
     )
-    torque = linear(flexible, THETA, RobotChannel())
-    angle = linear(flexible, THETA, RobotChannel(MotorAngles()))
+    torque = linear_robot(flexible, THETA, RobotChannel())
+    angle = linear_robot(flexible, THETA, RobotChannel(MotorAngles()))
     sorted_match(torque.zeros(), angle.zeros(), 1e-6)
     assert torque.zero_structure().infinite == (2, 2, 2)
     assert np.abs(np.asarray(angle.D)).max() > 0.1
@@ -136,7 +135,7 @@ def test_rigid_gears_by_torque_and_by_angle(robot):
             flexible, THETA, RobotChannel(MotorTorques((0,), CascadeMotorControl()))
         )
     # nothing is elastic: the zeros are none
-    rigid = linear(stiff, THETA, RobotChannel())
+    rigid = linear_robot(stiff, THETA, RobotChannel())
     assert rigid.zeros().size == 0
 
 
@@ -144,31 +143,31 @@ def test_rigid_gears_by_torque_and_by_angle(robot):
 def test_fewer_axes_locked_or_held(robot):
     """Locked motors are controllers of endless gain."""
     outputs = ToolPosition((2,))
-    locked = linear(robot, THETA, RobotChannel(MotorTorques((1,)), outputs))
+    locked = linear_robot(robot, THETA, RobotChannel(MotorTorques((1,)), outputs))
     assert locked.A.shape == (14, 14)
     held = RobotChannel(MotorTorques((1,), CascadeMotorControl()), outputs)
-    soft = linear(robot, THETA, held)
+    soft = linear_robot(robot, THETA, held)
     assert soft.A.shape == (18, 18)
     stiff = RobotChannel(
         MotorTorques((1,), CascadeMotorControl(speed_bandwidth=1e6)), outputs
     )
-    near = linear(robot, THETA, stiff).zeros()
+    near = linear_robot(robot, THETA, stiff).zeros()
     slow = near[np.abs(near) < 500.0]
     aim = locked.zeros()
     for z in slow[np.abs(slow) > 30.0]:
         assert np.abs(aim - z).min() < 1e-3 * abs(z)
     by_angle = RobotChannel(MotorAngles((1,), CascadeMotorControl()), outputs)
-    sorted_match(linear(robot, THETA, by_angle).zeros(), soft.zeros(), 1e-6)
+    sorted_match(linear_robot(robot, THETA, by_angle).zeros(), soft.zeros(), 1e-6)
 
 
 @pytest.mark.slow
 def test_lag_of_the_motors_adds_a_degree_and_no_zero(robot, by_torque):
     inertia = np.asarray(robot.drives.motor.inertia)
     lag = robot.with_drives(motor=Motor(inertia, lag=np.full(3, 2e-3)))
-    model = linear(lag, THETA, RobotChannel())
+    model = linear_robot(lag, THETA, RobotChannel())
     assert model.relative_degree() == (4, 4, 4)
     sorted_match(model.zeros(), by_torque.zeros(), 1e-6)
-    angle = linear(lag, THETA, RobotChannel(MotorAngles()))
+    angle = linear_robot(lag, THETA, RobotChannel(MotorAngles()))
     sorted_match(angle.zeros(), by_torque.zeros(), 1e-6)
 
 
@@ -179,7 +178,7 @@ def test_sensors(robot):
     q, eta = static_equilibrium(robot, THETA)
     point = BodyPoint(robot.chain.tool[:3, 3], last)
     group = SensorGroup((ToolPosition((0,)), JointEncoder((2,)), point))
-    model = linear(robot, THETA, RobotChannel(MotorAngles(), group))
+    model = linear_robot(robot, THETA, RobotChannel(MotorAngles(), group))
     assert model.names.outputs[1] == "joint A3 [rad]"
     assert len(model.names.outputs) == 5
     assert_close(model.operating_point.y[1], q[2], rtol=1e-9)
@@ -227,7 +226,7 @@ def test_simplified_kr210_by_three_routes(simplified):
     held = zero_dynamics(system, jnp.zeros(4))
     assert held.is_unstable
     strict = eqx.filter_jit(lambda form: form.straightened_matrix())(held.form)
-    zeros = linear(simplified, jnp.zeros(1), channel).zeros()
+    zeros = linear_robot(simplified, jnp.zeros(1), channel).zeros()
     assert_close(held.eigenvalues, zeros, rtol=1e-8)
     assert_close(np.sort(np.linalg.eigvals(strict).real), zeros.real, rtol=1e-8)
     # s^2 - K (d s + c): one K for both coefficients
@@ -289,7 +288,7 @@ def test_map_equals_single_models(robot):
     assert done == [2, 3]
     assert found.degrees == (3, 3, 3)
     for k, pose in enumerate(poses):
-        model = linear(robot, robot.from_maker(jnp.asarray(pose)), RobotChannel())
+        model = linear_robot(robot, robot.from_maker(jnp.asarray(pose)), RobotChannel())
         sorted_match(found.figures.zeros[k], model.zeros(), 1e-6)
     counts = np.sum(np.asarray(found.figures.zeros).real > 0, axis=1)
     assert_close(found.figures.right_zeros, counts.astype(float), rtol=0)
@@ -300,12 +299,11 @@ def test_map_equals_single_models(robot):
 @pytest.mark.slow
 def test_poses_and_payloads_in_one_call(robot):
     """One program over payloads and poses; a heavier load swings more slowly."""
-    locked = RobotChannel(MotorAngles((0, 1, 2)))
 
     def at(mass, pose):
         loaded = robot.with_payload(mass, jnp.array([0.0, 0.0, 0.1]), 0.02 * jnp.eye(3))
         theta = loaded.from_maker(pose)
-        return pose_figures(loaded, theta, locked, RobotChannel(), (3, 3, 3))
+        return pose_figures(loaded, theta, RobotChannel(), (3, 3, 3))
 
     masses = jnp.array([0.5, 5.0, 15.0])
     poses = jnp.array([[0.2, -0.4, 0.7], [0.0, 0.3, 1.1]])
@@ -323,9 +321,8 @@ def test_sensitivities_against_differences(robot):
     names = {s.name: s for s in found}
     sizes = [max(abs(s.frequency), abs(s.zero)) for s in found]
     assert sizes == sorted(sizes, reverse=True)
-    locked = RobotChannel(MotorAngles((0, 1, 2)))
     figures = eqx.filter_jit(
-        lambda r: pose_figures(r, theta, locked, RobotChannel(), (3, 3, 3))
+        lambda r: pose_figures(r, theta, RobotChannel(), (3, 3, 3))
     )
     places = {
         "drives.stiffness.linear[A2]": (lambda r: r.drives.stiffness.linear, 1),

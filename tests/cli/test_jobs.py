@@ -101,7 +101,8 @@ def test_other_parts_of_the_drive_trains(option, part, tmp_path):
 @pytest.mark.slow
 def test_pose_grid_meets_its_figures(tmp_path):
     out = tmp_path / "grid"
-    assert main(["feedforward", "--quiet", "--grid", "6", "--out", str(out)]) == 0
+    arguments = ["--inverse", "flexible_joint", "asim", "--out", str(out)]
+    assert main(["feedforward", "--quiet", "--grid", "6", *arguments]) == 0
     grid = json.loads((out / "result.json").read_text())["grid"]
     criterion = {name: np.array(c) for name, c in grid["criterion"].items()}
     assert all(c.shape == (2, 36) and np.isfinite(c).all() for c in criterion.values())

@@ -23,11 +23,7 @@ from elastax.trajectory import PointToPoint
 
 from tests import systems
 from tests.helpers import assert_close
-
-
-@eqx.filter_jit
-def run(plant, model, inverse, reference, controller, **options):
-    return run_feedforward(plant, model, inverse, reference, controller, **options)
+from tests.runs import feedforward, run
 
 
 def test_flexible_joint_plant_is_followed_exactly():
@@ -35,7 +31,9 @@ def test_flexible_joint_plant_is_followed_exactly():
     plant = systems.elastic_2r().flexible_joint()
     reference = systems.smooth_reference([0.3, -0.9], [0.3, 0.4], settle=1.0)
     controller = CascadeMotorControl()
-    made = run(plant, plant, FlexibleJointInverse(), reference, controller)
+    made = eqx.filter_jit(run_feedforward)(
+        plant, plant, FlexibleJointInverse(), reference, controller
+    )
     # what the interpolation of the sampled command leaves, 7e-8 m on an arm of 1 m
     assert made.judgement.path_error_max < 1e-6
     assert made.judgement.settling_time < 1e-3
@@ -72,12 +70,13 @@ def move(robot, pose: str, cutoff: float = 10.0) -> Reference:
         limits.acceleration,
         limits.jerk,
     )
+    return sampled(motion, float(motion.duration), BesselFilter(6, cutoff))
+
+
+@eqx.filter_jit
+def sampled(motion, duration: float, filter) -> Reference:
     return Reference.from_position_function(
-        motion.position,
-        float(motion.duration),
-        1e-3,
-        filter=BesselFilter(6, cutoff),
-        settle=1.2,
+        motion.position, duration, 1e-3, filter=filter, settle=1.2
     )
 
 
@@ -144,7 +143,7 @@ def test_bounded_at_named_poses(pose, robot):
     """Finite everywhere, corrections below the error over twice the damping."""
     reference = move(robot, pose)
     inverse = ASIM()
-    command = eqx.filter_jit(inverse.feedforward)(robot, reference)
+    command = feedforward(inverse, robot, reference)
     for leaf in jax.tree.leaves(command):
         assert np.all(np.isfinite(leaf))
 

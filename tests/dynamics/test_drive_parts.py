@@ -119,18 +119,23 @@ def test_blocks_are_those_of_lagrange(name):
         assert_close(ours, desired, rtol=0, atol=1e-10 * scale)
 
 
-def driven(robot, inverse, model, dt):
-    """Joint angles of the plant and of the command, as far as solvers bring them."""
-    order = inverse.order(model)
+@eqx.filter_jit
+def feedforward(model, reference):
+    return FlexibleJointInverse().feedforward(model, reference)
+
+
+# a program of its own: it serves commands of several models
+@eqx.filter_jit
+def moved(plant, command):
+    return simulate(plant, command, CascadeMotorControl(), rtol=1e-9, atol=1e-11)
+
+
+def driven(plant, model, dt):
+    """Command of RLFJ and motion of the plant, as far as solvers bring them."""
+    order = FlexibleJointInverse().order(model)
     reference = systems.smooth_reference(START, CHANGE, 0.3, dt=dt, order=order)
-
-    @eqx.filter_jit
-    def run(robot, model):
-        command = inverse.feedforward(model, reference)
-        controller = CascadeMotorControl()
-        return command, simulate(robot, command, controller, rtol=1e-9, atol=1e-11)
-
-    return run(robot, model)
+    command = feedforward(model, reference)
+    return command, moved(plant, command)
 
 
 @pytest.mark.slow
@@ -143,13 +148,13 @@ def test_exact_inverse_moves_the_plant(parts):
     sample; the corners of plays leave more.
     """
     robot = systems.elastic_2r().flexible_joint().with_drives(**parts)
-    command, motion = driven(robot, FlexibleJointInverse(), robot, 5e-4)
+    command, motion = driven(robot, robot, 5e-4)
     plays = parts.get("branch") is SMOOTH["hysteresis"]["branch"]
     bound = 5e-5 if plays else 2e-5 if "stiffness" in parts else 2e-6
     assert_close(motion.q, command.q, rtol=0, atol=bound)
     # and the part matters: an inverse without it is worse by far
     plain = systems.elastic_2r().flexible_joint()
-    _, blind = driven(robot, FlexibleJointInverse(), plain, 5e-4)
+    _, blind = driven(robot, plain, 5e-4)
     assert np.max(np.abs(np.asarray(blind.q - command.q))) > 4 * bound
 
 
@@ -159,7 +164,7 @@ def test_exact_parts_in_the_plant(parts):
     """The plant runs, stays near the command, and modes tell where motors stick."""
     robot = systems.elastic_2r().flexible_joint()
     plant = robot.with_drives(**parts)
-    command, motion = driven(plant, FlexibleJointInverse(), robot, 1e-3)
+    command, motion = driven(plant, robot, 1e-3)
     assert np.all(np.isfinite(np.asarray(motion.q)))
     # 7 % of 150 N m against the loop's stiffness, inertia x 60 x 15 = 2700 N m/rad,
     # with the swing that it starts
@@ -180,12 +185,12 @@ def test_steep_friction_tends_to_the_exact_one():
     robot = systems.elastic_2r().flexible_joint()
     exact = robot.with_drives(motor_friction=EXACT["stick-slip"]["motor_friction"])
     exact = eqx.tree_at(lambda r: r.drives.motor_friction.peak, exact, jnp.ones(2))
-    _, desired = driven(exact, FlexibleJointInverse(), robot, 1e-3)
+    _, desired = driven(exact, robot, 1e-3)
     errors = []
     for steepness in (200.0, 2000.0):
         smooth = systems.friction(8.0 * TWO, 4.0, steepness)
         plant = robot.with_drives(motor_friction=smooth)
-        _, motion = driven(plant, FlexibleJointInverse(), robot, 1e-3)
+        _, motion = driven(plant, robot, 1e-3)
         errors.append(float(jnp.max(jnp.abs(motion.q - desired.q))))
     assert errors[1] < 0.3 * errors[0]
 

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from elastax.analysis import locked_frequencies
-from elastax.control import CascadeMotorControl, run_feedforward
+from elastax.control import CascadeMotorControl
 from elastax.dynamics import static_equilibrium
 from elastax.inverse import ASIM, FlexibleJointInverse
 from elastax.io import load_sid, save_sid
@@ -16,6 +16,7 @@ from elastax.kinematics import forward_kinematics
 from elastax.robots import ladder_link, modal_manipulator
 
 from tests.helpers import assert_close
+from tests.runs import run
 from tests.systems import smooth_reference
 
 
@@ -114,11 +115,6 @@ def test_asim_leaves_less_than_rlfj(robot):
     )
     errors = {}
     for name, inverse in (("asim", ASIM()), ("rlfj", FlexibleJointInverse())):
-        compare = eqx.filter_jit(
-            lambda robot: run_feedforward(
-                robot, robot, inverse, reference, CascadeMotorControl()
-            )
-        )
-        run = compare(robot)
-        errors[name] = float(run.judgement.path_error_integral_relative)
+        made = run(robot, robot, inverse, reference, CascadeMotorControl())
+        errors[name] = float(made.judgement.path_error_integral_relative)
     assert errors["asim"] < 0.05 * errors["rlfj"]
