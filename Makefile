@@ -22,9 +22,11 @@ demo: $(VENV)/.core
 test: $(VENV)/.test
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
-# Status 5 of pytest: no test carries the mark.
+# Status 5 of pytest: no test carries the mark. Their programs take longer to compile
+# than to run, so with few optimisations; the fast tests compile as a user does.
 slow: $(VENV)/.test
-	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS) || [ $$? -eq 5 ]
+	JAX_DISABLE_MOST_OPTIMIZATIONS=1 \
+	    $(BIN)/python -m pytest -m slow $(PYTEST_ARGS) || [ $$? -eq 5 ]
 
 lint: $(VENV)/.test
 	@echo "ruff check ..."

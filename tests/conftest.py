@@ -1,5 +1,6 @@
 """Settings of every test: precision, strictness, type checks, compilation cache."""
 
+import gc
 import os
 import pathlib
 
@@ -30,7 +31,7 @@ if "JAX_COMPILATION_CACHE_DIR" not in os.environ:
 
 
 _MAPS = pathlib.Path("/proc/self/maps")
-_MANY_MAPS = 15_000
+_MANY_MAPS = 10_000
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -43,6 +44,7 @@ def _programs_are_let_go():
     yield
     if _MAPS.exists() and len(_MAPS.read_bytes().splitlines()) > _MANY_MAPS:
         jax.clear_caches()
+        gc.collect()
 
 
 @pytest.fixture(scope="session")

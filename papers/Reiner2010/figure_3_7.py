@@ -170,7 +170,8 @@ def drive(plant, start, torque):
         return runge_kutta(lambda x, u: rate(plant, x, u), x, 0.5 * STEP, inputs), None
 
     def step(x, pair):
-        inputs = pair[0] + share[..., None] * (pair[1] - pair[0])
+        first, change = pair[0][None, None], (pair[1] - pair[0])[None, None]
+        inputs = first + share[..., None] * change
         x, _ = jax.lax.scan(small, x, inputs)
         return x, x
 

@@ -94,7 +94,7 @@ def test_equal_to_what_is_written(make, name):
 @slow
 @pytest.mark.parametrize("make", [elastic_2r, kr210], ids=["2r", "kr210"])
 def test_step_of_asim(make):
-    """A batch of two steps; derivative and gradient of one along the reference."""
+    """Two steps: a batch, or the derivative along the reference and the gradient."""
     robot = make()
     axes = (0, 1) if robot.axes < 3 else (0, 1, 2)
     inverse = ASIM(correction=PositionCorrection(axes=axes))
@@ -103,18 +103,16 @@ def test_step_of_asim(make):
         jax.random.key(0), (3, inverse.order(robot) + 1, robot.axes)
     )
 
-    def function(robot, sample):
+    def function(robot, sample, following):
         state = inverse.init(robot, sample, 1e-3)
-        return inverse.step(robot, state, sample)
-
-    def two_steps(sample):
-        _, state = function(robot, sample)
-        return inverse.step(robot, state, sample)[0]
+        _, state = inverse.step(robot, state, sample)
+        return inverse.step(robot, state, following)[0]
 
     def all_of(robot, samples):
         if robot.axes > 3:  # the written derivatives take minutes to compile
-            return jax.vmap(two_steps)(samples)
-        one = lambda robot, sample: function(robot, sample)[0]
-        return derivatives(one, robot, [samples[0]], [samples[1]])
+            return jax.vmap(lambda s: function(robot, s, s))(samples)
+        first, second = samples[0], samples[1]
+        both = [first, first + 1e-3 * second]
+        return derivatives(function, robot, both, [second, first])
 
     assert_equal_to_written(all_of, robot, samples)
