@@ -52,8 +52,9 @@ def test_figure_3_7(tmp_path, capsys):
     assert "theirs" in capsys.readouterr().out
     zero = lambda place: ours[f"largest real part of a zero, xi = {place} [1/s]"]
     assert zero("0.91") < 0 < zero("0.92")
-    # follows a motion of 0.9 m to a centimetre, drifts off afterwards; diverges beyond
-    assert ours["largest error of the end during the motion [m]"] < 0.012
+    # follows a motion of 0.9 m to 9 mm, drifts off afterwards; diverges beyond
+    assert abs(ours["largest error of the end during the motion [m]"] - 9e-3) < 1e-3
+    assert abs(ours["length of the motion of the end [m]"] - 0.9) < 0.05
     assert ours["error of the end 1.5 s after the start [m]"] > 0.03
     assert ours["largest torque, xi = 0.9 [N m]"] < 1e3
     assert ours["largest torque, xi = 0.95 [N m]"] == float("inf")
@@ -77,8 +78,7 @@ def test_figure_3_18(tmp_path, capsys):
     ours = load("Reiner2010/figure_3_18.py").main(tmp_path / "figure.png", names)
     assert (tmp_path / "figure.png").stat().st_size > 10_000
     assert "theirs" in capsys.readouterr().out
-    assert ours["nominal"] > 0 and ours["variant 5"] > 0
-    assert ours["variant 1"] == 0
+    assert ours == {"nominal": 6, "variant 1": 0, "variant 5": 6}
 
 
 @pytest.mark.slow
@@ -179,6 +179,8 @@ def test_figure_3_16(tmp_path, capsys):
         assert off["variant 5"] < 0.1 * off["variant 1"]
         assert abs(off["variant 4"] / off["variant 1"] - 1.0) < 0.1
         assert off["rigid"] > 5.0 * off["variant 1"]
+    for name, size in (("variant 1", 0.40), ("variant 5", 0.004), ("rigid", 9.3)):
+        assert abs(1e3 * ours[f"{name}: load"] / size - 1.0) < 0.1  # printed digits
 
 
 @pytest.mark.slow
@@ -188,7 +190,7 @@ def test_spin_up(tmp_path, capsys):
     assert (tmp_path / "figure.png").stat().st_size > 10_000
     assert "extension" in capsys.readouterr().out
     extension = ours["extension over the last 2 s [m]"]
-    assert abs(extension / 5.143e-4 - 1.0) < 0.02
+    assert abs(extension / 5.143e-4 - 1.0) < 4e-3
     # a lag of 0.57 m is what the literature shows; more modes change nothing
     lag = ours["largest lag [m]"]
     assert 0.55 < lag < 0.60

@@ -30,7 +30,8 @@ class Balanced(NamedTuple):
 def balanced(A, B, C, D) -> Balanced:
     r"""States, inputs and outputs scaled until rows and columns have like norms.
 
-    Powers of two, so that scaling rounds nothing. NumPy arrays stay such.
+    Powers of two, so that scaling rounds nothing; JAX's own are exact to rounding.
+    NumPy arrays stay such.
 
     References:
         [Osborne1960].

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._checks import is_concrete
 from .._custom_types import PerElastic, PerJoint, Vector3, as_real
 from .._taylor import leading
 from ..dynamics import AbstractMotorController, ElasticRobot
@@ -96,14 +97,27 @@ class AbstractSensor(eqx.Module):
 _LETTERS = ("x", "y", "z")
 
 
+def _check_directions(directions: tuple[int, ...]) -> None:
+    if not directions or any(k not in (0, 1, 2) for k in directions):
+        raise ValueError(
+            f"`directions` must be some of 0, 1, 2 for x, y, z, but are {directions}"
+        )
+
+
 class ToolPosition(AbstractSensor):
     """Position of the tool in the base frame [m].
 
     Attributes:
         directions: 0, 1, 2 for x, y, z.
+
+    Raises:
+        ValueError: another direction.
     """
 
     directions: tuple[int, ...] = eqx.field(static=True, default=(0, 1, 2))
+
+    def __check_init__(self):
+        _check_directions(self.directions)
 
     def measure(self, robot, q, eta, theta):
         pose = forward_kinematics(robot.chain, robot.joint_coordinates(q, eta))
@@ -126,11 +140,15 @@ class BodyPoint(AbstractSensor):
     joint: int = eqx.field(static=True)
     directions: tuple[int, ...] = eqx.field(static=True, default=(0, 1, 2))
 
+    def __check_init__(self):
+        _check_directions(self.directions)
+
     def measure(self, robot, q, eta, theta):
         rotation, position = _frame(robot, self.joint, q, eta)
         return (position + rotation @ self.point)[np.array(self.directions)]
 
     def names(self, robot):
+        _check_index("joint", self.joint, robot.chain.number)
         label = f"point behind joint {self.joint}"
         return tuple(f"{label} {_LETTERS[k]} [m]" for k in self.directions)
 
@@ -151,6 +169,9 @@ class NodePoint(AbstractSensor):
     link: int = eqx.field(static=True, default=0)
     directions: tuple[int, ...] = eqx.field(static=True, default=(0, 1, 2))
 
+    def __check_init__(self):
+        _check_directions(self.directions)
+
     def measure(self, robot, q, eta, theta):
         link = robot.modal_links[self.link]
         rotation, position = _frame(robot, link.joint, q, eta)
@@ -159,7 +180,11 @@ class NodePoint(AbstractSensor):
         return (position + rotation @ at)[np.array(self.directions)]
 
     def names(self, robot):
+        _check_index("flexible link", self.link, len(robot.modal_links))
         name = robot.modal_links[self.link].body.name
+        if is_concrete(self.node):
+            nodes = robot.modal_links[self.link].body.nodes
+            _check_index("node", int(self.node), nodes.number)
         return tuple(f"node of {name} {_LETTERS[k]} [m]" for k in self.directions)
 
 
@@ -200,7 +225,16 @@ class SensorGroup(AbstractSensor):
         return tuple(name for sensor in self.sensors for name in sensor.names(robot))
 
 
+def _check_index(what: str, index: int, number: int) -> None:
+    if not 0 <= index < number:
+        raise ValueError(
+            f"the sensor's {what} must be one of 0 to {number - 1}, but is {index}"
+        )
+
+
 def _angle_names(what: str, robot: ElasticRobot, axes: tuple[int, ...]):
+    for axis in axes:
+        _check_index("axis", axis, robot.axes)
     return tuple(f"{what} {robot.axis_names[k]} [rad]" for k in axes)
 
 

@@ -29,7 +29,7 @@ class ControlSystem(eqx.Module):
         [Reiner2010] (3.4), (3.14).
 
     Examples:
-        >>> pendulum = ControlSystem.of(
+        >>> pendulum = ControlSystem(
         ...     lambda x, u: jnp.array([x[1], -9.81 * jnp.sin(x[0]) + u[0]]),
         ...     lambda x: x[:1],
         ...     SignalNames(("angle", "speed"), ("torque",), ("angle",)),

@@ -21,7 +21,7 @@ def linear_relative_degree(model):
     A, B, C, D = (np.asarray(x) for x in (model.A, model.B, model.C, model.D))
     degrees, rows = [], []
     for i, name in enumerate(model.names.outputs):
-        if np.any(D[i] != 0):
+        if np.any(np.abs(D[i]) > _ROUNDING * np.abs(D).max()):
             degrees.append(0)
             rows.append(D[i])
             continue

@@ -112,4 +112,5 @@ def _at_nodes(robot, theta, nodes, inputs, link, direction, degree):
         gain = (row @ B)[0, 0] if degree else D[0, 0]
         return transmission_zeros(A, B, C, D, (degree,)), model.poles(), gain
 
-    return jax.vmap(at)(nodes)
+    # one by one: on single matrices LAPACK never waits
+    return jax.lax.map(at, nodes)

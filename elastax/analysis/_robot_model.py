@@ -173,6 +173,7 @@ class _Rest(NamedTuple):
 def _models(robot: ElasticRobot, theta, channel: RobotChannel):
     require_float64("the linear model of a robot")
     held = channel.inputs.held(robot)
+    output_names = channel.outputs.names(robot)
     if robot.drives.switches:
         raise ValueError(
             "a linear model needs smooth drive trains, but these have parts that "
@@ -198,7 +199,7 @@ def _models(robot: ElasticRobot, theta, channel: RobotChannel):
     names = SignalNames(
         tuple(open_loop.names[k] for k in keep),
         tuple(f"motor {label} {robot.axis_names[k]} [{unit}]" for k in driven),
-        channel.outputs.names(robot),
+        output_names,
     )
     x = open_loop.x[keep]
     point = OperatingPoint(x, u, y, jnp.zeros_like(x))

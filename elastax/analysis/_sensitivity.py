@@ -51,7 +51,12 @@ def sensitivities(
         theta: motor angles at rest [rad].
         channel: inputs and outputs.
         degrees: relative degrees of the outputs.
+
+    Raises:
+        ValueError: nothing in the robot is elastic.
     """
+    if not robot.has_elastic_gears and not robot.elastic:
+        raise ValueError("a rigid robot has no eigenfrequencies and no zeros")
     parameters, rest = eqx.partition(robot, eqx.is_inexact_array)
     figures, slopes = _slopes(parameters, rest, theta, channel, tuple(degrees))
     values = np.asarray(figures)
@@ -79,9 +84,11 @@ def _slopes(parameters, rest, theta, channel, degrees):
     def figures(parameters):
         robot = eqx.combine(parameters, rest)
         found = pose_figures(robot, theta, channel, degrees)
-        return jnp.stack([found.frequency, found.slowest_right])
+        both = jnp.stack([found.frequency, found.slowest_right])
+        return both, both
 
-    return figures(parameters), jax.jacrev(figures)(parameters)
+    slopes, values = jax.jacrev(figures, has_aux=True)(parameters)
+    return values, slopes
 
 
 def _label(robot: ElasticRobot, place: str, index: tuple[int, ...]) -> str:

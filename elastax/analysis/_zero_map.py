@@ -165,9 +165,16 @@ def zero_map(
     poses = jnp.asarray(poses)
     if poses.ndim != 2 or poses.shape[1] != robot.axes:
         raise ValueError(f"`poses` must be (poses, {robot.axes}), but is {poses.shape}")
-    degrees = _degrees(robot, poses, channel)
     if not robot.has_elastic_gears and not robot.elastic:
         raise ValueError("a rigid robot has no eigenfrequencies and no zeros to map")
+    inputs, outputs = len(channel.inputs.axes), len(channel.outputs.names(robot))
+    if inputs != outputs:
+        raise ValueError(
+            "a map of zeros needs as many outputs as inputs, but there are "
+            f"{outputs} outputs and {inputs} inputs: drive other axes, or measure "
+            "other directions"
+        )
+    degrees = _degrees(robot, poses, channel)
 
     parts = []
     for start in range(0, len(poses), batch):
@@ -195,18 +202,18 @@ def _figures(robot, poses, channel, degrees):
 def _degrees(robot: ElasticRobot, poses, channel: RobotChannel) -> tuple[int, ...]:
     """Relative degrees at the first of some poses at which they are defined."""
     some = np.unique(np.linspace(0, len(poses) - 1, 12).astype(int))
+    problem = None
     for k in some:
-        model = linear_robot(robot, robot.from_maker(poses[k]), channel)
-        counts = len(model.names.inputs), len(model.names.outputs)
-        if counts[0] != counts[1]:
-            raise ValueError(
-                "a map of zeros needs as many outputs as inputs, but there are "
-                f"{counts[1]} outputs and {counts[0]} inputs: drive other axes, or "
-                "measure other directions"
-            )
-        degrees = model.relative_degree()
+        try:
+            model = linear_robot(robot, robot.from_maker(poses[k]), channel)
+            degrees = model.relative_degree()
+        except ValueError as error:
+            problem = error
+            continue
         if float(conditioning(model, degrees)) > _SINGULAR:
             return degrees
+    if problem is not None:
+        raise problem
     raise ValueError(
         "the decoupling matrix is singular at all poses that were tried: choose other "
         "inputs or outputs"

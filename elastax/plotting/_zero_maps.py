@@ -62,7 +62,6 @@ def _maps(found: ZeroMap, axes, title, panels, regular, *, logarithmic: bool) ->
     for panel, (label, values) in zip(drawn, panels):
         grid = np.full((len(up), len(across)), np.nan)
         grid[row, column] = values
-        some = grid[np.isfinite(grid)]
         panel.grid(False)
         if regular is not None:
             mask = np.full(grid.shape, np.nan)
@@ -76,6 +75,7 @@ def _maps(found: ZeroMap, axes, title, panels, regular, *, logarithmic: bool) ->
                 norm=Normalize(0.0, 2.0),
                 shading="nearest",
             )
+        some = grid[np.isfinite(grid)]
         if some.size:
             low, high = np.percentile(some, [1, 99])
             norm = LogNorm(low, high) if logarithmic else Normalize(low, high)

@@ -55,15 +55,20 @@ def linear(x_l):
     return linearise(example(x_l), jnp.zeros(4), jnp.zeros(1))
 
 
+def at(x_l) -> np.ndarray:
+    """Zeros; an array as length, so that one program serves all."""
+    return linear(jnp.asarray(x_l)).zeros()
+
+
 def main(path: pathlib.Path | None = None) -> dict[str, float]:
     """Zeros at 0.5 m and the critical length.
 
     Args:
         path: of a PNG to write.
     """
-    zeros = linear(0.5).zeros().real
+    zeros = at(0.5).real
     limit = J_Z / (M * L * (1 - XI))
-    before, beyond = linear(0.999 * limit).zeros(), linear(1.001 * limit).zeros()
+    before, beyond = at(0.999 * limit), at(1.001 * limit)
     found = {
         "zero 1 at x_l = 0.5 m [1/s]": float(zeros[0]),
         "zero 2 at x_l = 0.5 m [1/s]": float(zeros[1]),
@@ -83,7 +88,7 @@ def plot() -> Figure:
     lengths = np.concatenate(
         [np.linspace(0.0, 0.0624, 60), np.linspace(0.0626, 0.5, 60)]
     )
-    zeros = np.stack([linear(float(x)).zeros() for x in lengths])
+    zeros = np.stack([at(x) for x in lengths])
     figure = Figure(figsize=(9.0, 4.4), layout="constrained")
     FigureCanvasAgg(figure)
     plane, over = figure.subplots(1, 2)

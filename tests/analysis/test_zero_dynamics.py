@@ -74,7 +74,9 @@ def test_textbook_system(name):
     expected = np.sort_complex(np.array(case.eigenvalues, complex))
     size = np.abs(expected).max(initial=1.0)
     # a double zero is exact to the root of rounding
-    assert_close(found.eigenvalues, expected, rtol=case.rtol, atol=1e-7 * size)
+    double = name == "pendulum on a cart, angle"
+    atol = (1e-7 if double else 1e-12) * size
+    assert_close(found.eigenvalues, expected, rtol=case.rtol, atol=atol)
     verdicts = {
         "stable": found.is_stable,
         "unstable": found.is_unstable,
@@ -107,7 +109,7 @@ def test_linearised_system_has_the_same_zeros(name):
     structure = model.zero_structure()
     assert structure.infinite == tuple(sorted(case.degrees))
     size = np.abs(np.asarray(found.eigenvalues)).max(initial=1.0)
-    assert_close(structure.finite, found.eigenvalues, rtol=1e-8, atol=1e-7 * size)
+    assert_close(structure.finite, found.eigenvalues, rtol=1e-8, atol=1e-10 * size)
 
 
 @pytest.mark.parametrize(("sign", "grows"), [(1.0, False), (-1.0, True)])

@@ -2,7 +2,6 @@
 
 import json
 import pathlib
-import time
 
 import jax
 import numpy as np
@@ -27,16 +26,18 @@ def run(tmp_path, *words):
 
 @pytest.mark.slow
 def test_small_robot_with_map(tmp_path, capsys):
-    words = ["--robot", str(EXAMPLE), "--pose", "20", "-30", "50", "--grid", "5"]
-    assert run(tmp_path, *words) == 0
+    words = ["--robot", str(EXAMPLE), "--pose", "-37", "42", "5", "--grid", "5"]
+    assert run(tmp_path, *words, "--sensitivity") == 0
     printed = capsys.readouterr().out
     assert "mode [Hz]" in printed and "zero, real [1/s]" in printed
-    assert "25 poses" in printed
+    assert "25 poses" in printed and "% per %" in printed
     folder = tmp_path / "out"
     result = json.loads((folder / "result.json").read_text())
     assert result["schema"] == "elastax.analyse/1"
     assert result["infinite_zeros"] == [3, 3, 3]
     assert len(result["zeros"]["real"]) == 9
+    slopes = {row["name"]: row for row in result["sensitivity"]}
+    assert np.isfinite(slopes["payload.mass[payload]"]["zero"])
     grid = result["grid"]
     assert grid["poses"] == 25
     assert grid["with_right_zeros"] + grid["masked"] <= 25
@@ -87,21 +88,14 @@ def test_bad_input(tmp_path, capsys, words, message):
 @pytest.mark.slow
 def test_map_of_the_kr210(tmp_path, capsys):
     """4,096 poses; almost everywhere there is no stable inverse."""
-    start = time.perf_counter()
     assert run(tmp_path, "--grid", "64") == 0
-    seconds = time.perf_counter() - start
     result = json.loads((tmp_path / "out" / "result.json").read_text())
     grid = result["grid"]
     assert grid["poses"] == 4096
-    assert grid["masked"] < 200
-    assert grid["with_right_zeros"] > 3800
+    # those in the README, but for poses at the edge of what counts
+    assert abs(grid["masked"] - 94) <= 4
+    assert abs(grid["with_right_zeros"] - 4002) <= 4
+    right = [x for x in result["zeros"]["real"] if x > 1.0]
+    np.testing.assert_allclose(sorted(right), [46.8, 295.0, 5113.0], rtol=2e-3)
     low, _, high = grid["first_frequency"]
     assert 4.0 < low < high < 10.0
-    print(f"{seconds:.0f} s")
-
-
-@pytest.mark.slow
-def test_sensitivity(tmp_path, capsys):
-    words = ["--robot", str(EXAMPLE), "--pose", "-37", "42", "5", "--sensitivity"]
-    assert run(tmp_path, *words) == 0
-    assert "% per %" in capsys.readouterr().out

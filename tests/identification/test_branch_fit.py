@@ -119,6 +119,6 @@ def test_stiffness_of_a_slipping_spring():
     law = StopBranch(SPRINGS, rate_independent(THRESHOLDS))
     torques = jax.vmap(lambda end: torque(law, end))(END)
     start = dataclasses.replace(law, stiffness=0.5 * SPRINGS)
-    fit = fit_law(start, torque, END, torques, held=lambda law: law.play)
+    fit = jitted_fit(start, torque, END, torques, held=lambda law: law.play)
     assert fit.names == ("stiffness[0, 0]", "stiffness[1, 0]")
     assert_close(fit.law.stiffness, SPRINGS, rtol=1e-9)

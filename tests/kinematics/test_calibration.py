@@ -58,6 +58,7 @@ def test_encoder_offset_is_the_angle_of_its_joint(small_problem):
     assert_close(found.encoder_offset(), [0, 2e-3], rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_dependent_parameters_are_named_and_left_out():
     # one point at the tool's origin, all parameters
     problem = problem_of(heavy(), PointInstrument(5e-5), poses(30))

@@ -206,6 +206,7 @@ def test_nearly_parallel_axes_are_converted():
     assert "(joints 2)" in converted.conversion and converted.condition < 50
 
 
+@pytest.mark.slow
 def test_kept_parameters():
     chain = model("ur").parameters.chain
     tool = [f"tool_{c}" for c in ("x", "y", "z", "rx", "ry", "rz")]

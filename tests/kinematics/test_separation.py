@@ -28,6 +28,9 @@ def chain():
 
 solve = jax.jit(inverse_by_separation)
 solve_generally = jax.jit(inverse_kinematics)
+slopes = jax.jit(
+    jax.jacrev(lambda chain, pose: inverse_by_separation(chain, pose)[0], 1)
+)
 find_unknowns = jax.jit(contained_unknowns, static_argnames=("left", "right"))
 
 
@@ -187,8 +190,7 @@ def test_out_of_reach_is_masked_and_finite(chain, position):
     _, masks = solve_generally(SphericalWrist.from_chain(chain), pose)
     assert valid.tolist() == masks.tolist()
     assert np.all(np.isfinite(solutions))
-    slopes = jax.jit(jax.jacrev(lambda pose: inverse_by_separation(chain, pose)[0]))
-    assert np.all(np.isfinite(slopes(pose)))
+    assert np.all(np.isfinite(slopes(chain, pose)))
 
 
 def test_refusals(chain):

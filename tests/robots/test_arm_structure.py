@@ -60,6 +60,7 @@ def rigid_blocks(robot):
     return blocks.M_aa, blocks.h_a
 
 
+@pytest.mark.slow
 def test_undeformed_all_are_one_robot(robots):
     expected = rigid_blocks(robots["hinged"])
     pose = forward_kinematics(robots["hinged"].rigid().chain, Q)

@@ -29,8 +29,7 @@ BEAM = UniformBeam(
     BeamSection.rectangular_tube(height=0.10, width=0.06, wall=0.005),
     1.3,
 )
-build = eqx.filter_jit(modal_beam)
-BODY = build(BEAM, ModeCounts(3, 3, 1, 2), nodes=(0.5,))
+BODY = modal_beam(BEAM, ModeCounts(3, 3, 1, 2), nodes=(0.5,))
 L, MASS = 1.3, float(BEAM.mass())
 
 
@@ -49,7 +48,7 @@ def test_mass_and_modes():
     first = 1.875104068711961**2 * np.sqrt(
         float(BEAM.rigidity()[1]) / (MASS / L) / L**4
     )
-    slender = build(BEAM, ModeCounts(0, 1), rotary_inertia=False)
+    slender = modal_beam(BEAM, ModeCounts(0, 1), rotary_inertia=False)
     assert_close(slender.frequencies()[0], first / (2 * np.pi), rtol=1e-12)
 
 
@@ -71,7 +70,7 @@ def test_modal_statics_approach_the_exact_tip():
     exact = np.asarray(BEAM.tip_compliance())[0]
     errors = []
     for number in (1, 3, 10):
-        body = build(BEAM, ModeCounts(0, number), rotary_inertia=False)
+        body = modal_beam(BEAM, ModeCounts(0, number), rotary_inertia=False)
         phi = np.asarray(body.nodes.phi)[-1, 2]
         deflection = np.sum(phi**2 / np.diag(np.asarray(body.K_e)))
         errors.append(1.0 - deflection / exact[0, 0])
@@ -103,7 +102,7 @@ def test_shortening_keeps_the_length():
 
 def rotating_frequency(speed, axis, modes):
     """First bending frequency of a beam that turns about `axis` through its base."""
-    body = build(BEAM, ModeCounts(*modes), rotary_inertia=False)
+    body = modal_beam(BEAM, ModeCounts(*modes), rotary_inertia=False)
     omega = jnp.zeros(3).at[axis].set(speed)
 
     def forces(eta):
@@ -133,7 +132,7 @@ def test_rotating_beam_against_the_southwell_rise():
 
 
 def test_without_the_shortening_rotation_softens():
-    body = build(BEAM, ModeCounts(0, 1), rotary_inertia=False)
+    body = modal_beam(BEAM, ModeCounts(0, 1), rotary_inertia=False)
     soft = dataclasses.replace(body, C_t1=0.0 * body.C_t1, J_2=_without_curvature(body))
     omega = jnp.array([0.0, 1.0, 0.0])
     pull = lambda b: float(free_body(b, omega, jnp.ones(1), jnp.zeros(1))[1][6])
@@ -153,10 +152,10 @@ def _without_curvature(body):
 def test_tip_mass_belongs_or_only_shapes():
     counts = ModeCounts(2, 2)
     tip = TipMass(5.0, [0.1, 0.2, 0.3])
-    inside = build(BEAM, counts, tip=tip)
+    inside = modal_beam(BEAM, counts, tip=tip)
     assert_close(inside.mass, MASS + 5.0, rtol=1e-14)
     assert_close(inside.M_e, np.eye(4), rtol=0.0, atol=1e-12)
-    beside = build(BEAM, counts, tip=dataclasses.replace(tip, belongs=False))
+    beside = modal_beam(BEAM, counts, tip=dataclasses.replace(tip, belongs=False))
     assert_close(beside.mass, MASS, rtol=1e-14)
     assert_close(beside.K_e, inside.K_e, rtol=1e-13)
     end = np.asarray(inside.nodes.phi)[-1, 1]
@@ -170,7 +169,7 @@ def test_tip_mass_belongs_or_only_shapes():
     ("support", "moving"), [(SupportedFree(), "psi"), (FreeFree(), "phi")]
 )
 def test_other_supports_move_the_base(support, moving):
-    body = build(BEAM, ModeCounts(2), support=support)
+    body = modal_beam(BEAM, ModeCounts(2), support=support)
     base = np.asarray(getattr(body.nodes, moving))[0]
     assert np.max(np.abs(base)) > 0.1
     if isinstance(support, FreeFree):
@@ -181,7 +180,7 @@ def test_other_supports_move_the_base(support, moving):
 
 
 def test_damping_ratio():
-    body = build(BEAM, ModeCounts(1, 1), damping_ratio=0.01)
+    body = modal_beam(BEAM, ModeCounts(1, 1), damping_ratio=0.01)
     w = np.sqrt(np.diag(np.asarray(body.K_e)))
     assert_close(np.diag(np.asarray(body.D_e)), 0.02 * w, rtol=1e-13)
     assert isinstance(ClampedFree().rigid_modes, int)
