@@ -1,6 +1,6 @@
 """What do the functions of `analysis` cost, by use, with their compilation?
 
-`python -m benchmarks.analysis`; no peers, not a part of `make bench`, five minutes.
+`python -m benchmarks.analysis`; no peers, not a part of `make bench`, eight minutes.
 Linear model, transmission zeros and figures of a pose of the KR210 from the motor
 torques of A1 to A3 to the place of the tool: one call at a time, one after another in a
 scan, vmapped over poses, and with a forward and a reverse derivative by all parameters.
