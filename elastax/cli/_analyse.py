@@ -173,6 +173,7 @@ def figures_of(model: LinearModel) -> dict:
     modes, structure = model.modes(), model.zero_structure()
     zeros = structure.finite
     right = right_zeros(zeros)
+    on_axis = len(zeros) - len(right) - len(right_zeros(-zeros))
     counts = len(model.names.inputs), len(model.names.outputs)
     square = counts[0] == counts[1] == structure.normal_rank
     return {
@@ -189,9 +190,10 @@ def figures_of(model: LinearModel) -> dict:
         "normal_rank": structure.normal_rank,
         "rank_tolerance": structure.tolerance,
         "right_zeros": len(right),
+        "zeros_on_the_axis": on_axis,
         "slowest_right_zero": float(np.abs(right).min()) if len(right) else None,
         "invertible": bool(square),
-        "stable_inverse": bool(square and not len(right)),
+        "stable_inverse": bool(square and not len(right) and not on_axis),
     }
 
 
@@ -224,7 +226,8 @@ def zeros_text(model: LinearModel, result: dict) -> str:
     lines = [
         f"from {', '.join(model.names.inputs)}",
         f"to   {', '.join(model.names.outputs)}",
-        f"relative degrees {tuple(result['infinite_zeros'])}, {len(zeros)} zeros",
+        f"orders of the infinite zeros {tuple(result['infinite_zeros'])}, "
+        f"{len(zeros)} finite zeros",
     ]
     if not result["invertible"]:
         lines.append(
@@ -240,6 +243,11 @@ def zeros_text(model: LinearModel, result: dict) -> str:
     titles = ["zero, real [1/s]", "+- imaginary [rad/s]", "size [Hz]"]
     right = result["right_zeros"]
     verdict = "all zeros lie on the left: the exact inverse is stable"
+    if result["zeros_on_the_axis"]:
+        verdict = (
+            f"{result['zeros_on_the_axis']} zeros on the imaginary axis, none on the "
+            "right: the exact inverse is not asymptotically stable"
+        )
     if right:
         verdict = (
             f"{right} zeros on the right, the nearest "

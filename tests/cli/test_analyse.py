@@ -6,7 +6,9 @@ import pathlib
 import jax
 import numpy as np
 import pytest
+from elastax.analysis import LinearModel
 from elastax.cli import main
+from elastax.cli._analyse import figures_of, zeros_text
 
 
 EXAMPLE = pathlib.Path(__file__).parents[2] / "examples" / "robot.toml"
@@ -64,6 +66,17 @@ def test_more_outputs_than_inputs(tmp_path, capsys):
     assert "no inverse: the transfer matrix of 2 inputs and 3 outputs" in (
         capsys.readouterr().out
     )
+
+
+def test_zeros_on_the_axis_are_not_called_stable():
+    """Two masses on an undamped spring, force and place of the first."""
+    A = np.zeros((4, 4))
+    A[0, 2] = A[1, 3] = 1.0
+    A[2:, :2] = [[-1.0, 1.0], [1.0, -1.0]]
+    model = LinearModel(A, np.eye(4)[:, 2:3], np.eye(4)[:1])
+    result = figures_of(model)
+    assert not result["stable_inverse"] and result["right_zeros"] == 0
+    assert "2 zeros on the imaginary axis" in zeros_text(model, result)
 
 
 REFUSALS = [
