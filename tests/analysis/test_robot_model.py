@@ -206,6 +206,7 @@ def test_nonlinear_system_has_the_same_linear_model(robot, by_torque):
     along = jnp.cos(jnp.arange(18.0))
     difference = (rate(moving + h * along) - rate(moving - h * along)) / (2 * h)
     size = float(jnp.abs(difference).max())
+    # rounding of the rates, 1e-13 of them, over h
     assert_close(there.A @ along, difference, rtol=0, atol=1e-6 * size)
 
 
@@ -236,8 +237,9 @@ def test_simplified_kr210_by_three_routes(simplified):
     # s^2 - K (d s + c): one K for both coefficients
     total, product = np.sum(zeros).real, np.prod(zeros).real
     assert_close(total / 1e3, -product / 1e6, rtol=1e-8)
+    # ours as printed, to the last digit
     assert_close(zeros.real, [-129.69, 149.02], rtol=0, atol=0.01)
-    # theirs, (3.27), of a geometry that is not printed: K = 0.0244; ours is 0.0193
+    # K to three digits; theirs, (3.27), of a geometry that is not printed: 0.0244
     assert_close(total / 1e3, 0.0193, rtol=5e-3)
 
 

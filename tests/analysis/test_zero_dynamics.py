@@ -109,6 +109,7 @@ def test_linearised_system_has_the_same_zeros(name):
     structure = model.zero_structure()
     assert structure.infinite == tuple(sorted(case.degrees))
     size = np.abs(np.asarray(found.eigenvalues)).max(initial=1.0)
+    # real or imaginary parts that are zero come out as rounding of the largest
     assert_close(structure.finite, found.eigenvalues, rtol=1e-8, atol=1e-10 * size)
 
 

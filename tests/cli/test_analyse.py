@@ -109,6 +109,7 @@ def test_map_of_the_kr210(tmp_path, capsys):
     assert abs(grid["masked"] - 94) <= 4
     assert abs(grid["with_right_zeros"] - 4002) <= 4
     right = [x for x in result["zeros"]["real"] if x > 1.0]
+    # three printed digits
     np.testing.assert_allclose(sorted(right), [46.8, 295.0, 5113.0], rtol=2e-3)
     low, _, high = grid["first_frequency"]
     assert 4.0 < low < high < 10.0
